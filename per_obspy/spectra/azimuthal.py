@@ -9,7 +9,7 @@ from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import azimuth_samples as kernels
-from per_obspy.kernels.spectra import azimuth_steps
+from per_obspy.kernels.spectra import azimuth_steps, azimuth_tiles
 from per_obspy.kernels.spectra import tile_search as blocks
 from per_obspy.spectra.elastic import grid_of, row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (
@@ -260,23 +260,23 @@ def _block_squares(
     exact: bool,
 ) -> FloatArray:
     """Return the largest squares of one block, scaled acceleration / omega², (rows, lanes)."""
-    packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
+    table = np.empty((azimuth_tiles.ROWS, blocks.LANES))
     tile_states = np.empty((blocks.TILES, 6, blocks.LANES))
     largest = np.zeros((len(shares), blocks.LANES, fan[0].shape[1]))
-    kernels.pack_steps(block.phases, block.dampings, packed)
+    azimuth_tiles.pack(block.phases, block.dampings, table)
 
     # All lanes run together, then each is turned into every azimuth
     for stretch in stretches(record):
-        kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, tile_states)
+        azimuth_tiles.run_azimuth_tiles(*stretch[:4], table, tile_states)
         for share, squares in zip(shares, largest, strict=True):
             azimuth_steps.raise_azimuths(
-                *stretch[:4], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
+                *stretch[:2], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
             )
 
     # In free vibration the radius never grows, the displacement may
     if DISPLACEMENT in shares:
         displacements = largest[shares.index(DISPLACEMENT)]
-        kernels.free_displacements(state, block.dampings, block.size, fan[0], displacements)
+        kernels.free_displacements(table[:4], block.dampings, block.size, fan[0], displacements)
     return np.concatenate([squares.T for squares in largest])
 
 

@@ -11,6 +11,7 @@ omega²``, time as phase.
 from per_obspy.kernels._aligned import aligned
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.exact_stride import fill_stride_weights
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
 
 #: Oscillators next to each other: a constant trip count, which the compiler turns into vectors.
@@ -44,19 +45,9 @@ def pack_oscillator(stride, phase, damping, north, east, table, lane):
         table[STEP + row, lane] = coefficients[row]
     for row in range(4):
         table[MATRIX + row, lane] = stride_coefficients[row]
-    # Weights of the samples of a stride: those of a step, moved on by the steps after it
-    a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
-    for sample in range(stride):
-        for earlier in range(sample + 1):
-            u = table[DISPLACED + earlier, lane]
-            z = table[MOVED + earlier, lane]
-            table[DISPLACED + earlier, lane] = a11 * u + a12 * z
-            table[MOVED + earlier, lane] = a21 * u + a22 * z
-        # The step itself: its first sample was the last one of the step before
-        table[DISPLACED + sample, lane] += b11
-        table[MOVED + sample, lane] += b21
-        table[DISPLACED + sample + 1, lane] = b12
-        table[MOVED + sample + 1, lane] = b22
+    # Weights of the samples of a stride
+    displaced, moved = table[DISPLACED:MOVED, lane], table[MOVED:PHASE, lane]
+    fill_stride_weights(coefficients, stride, displaced[: stride + 1], moved[: stride + 1])
 
 
 @kernel

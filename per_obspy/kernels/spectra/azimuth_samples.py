@@ -13,17 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
+from per_obspy.kernels.extremes import place_of_largest, smallest
 from per_obspy.kernels.oscillator.exact_step import step_coefficients, unit_responses
 from per_obspy.kernels.spectra.response import first_root
-from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE
+from per_obspy.kernels.spectra.tile_search import TILE
 
-#: ``sqrt(1 + x²) <= 1 + 0.4143 x`` for x from 0 to 1: a bound of the eigenvalue without a square
-#: root.
-CHORD = 0.41422
 #: Neighbouring azimuths that are ruled out together: as many as fit into the widest vectors.
 GROUP = 8
 #: Tiles with the largest bounds that are visited first, to raise the smallest maximum early.
-LEADERS = 6
+LEADERS = 16
 #: Other tiles after which the floor is renewed.
 RENEWAL = 4
 
@@ -35,108 +33,6 @@ class Oscillator(NamedTuple):
     phase: float
     damping: float
     share: float
-
-
-@kernel
-def pack_steps(phases, dampings, packed):
-    """
-    Fill the coefficients of a step of each oscillator.
-
-    Parameters
-    ----------
-    phases, dampings : (LANES,) ndarray
-        Phase ``omega * dt`` of a step, rad; fraction of critical.
-    packed : (8, LANES) ndarray
-        Receives a11, a12, a21, a22, b11, b12, b21, b22 of `exact_step.step_coefficients`.
-    """
-    for lane in range(LANES):
-        for row, coefficient in enumerate(step_coefficients(1.0, dampings[lane], phases[lane])):
-            packed[row, lane] = coefficient
-
-
-@kernel
-def _open_tile(un, zn, ue, ze, radius, displacement, checkpoint):
-    """Store the states before a tile and start its bounds with theirs (the trace for radii)."""
-    for lane in range(LANES):
-        # Denormal states become zero
-        un[lane] = un[lane] if abs(un[lane]) > SMALLEST_STATE else 0.0
-        zn[lane] = zn[lane] if abs(zn[lane]) > SMALLEST_STATE else 0.0
-        ue[lane] = ue[lane] if abs(ue[lane]) > SMALLEST_STATE else 0.0
-        ze[lane] = ze[lane] if abs(ze[lane]) > SMALLEST_STATE else 0.0
-        # Checkpoint and bounds
-        checkpoint[0, lane], checkpoint[1, lane] = un[lane], zn[lane]
-        checkpoint[2, lane], checkpoint[3, lane] = ue[lane], ze[lane]
-        displacement[lane] = un[lane] * un[lane] + ue[lane] * ue[lane]
-        radius[lane] = displacement[lane] + zn[lane] * zn[lane] + ze[lane] * ze[lane]
-
-
-@kernel
-def run_azimuth_tiles(north, east, packed, state, checkpoints):
-    """
-    Advance a block over the samples; store a checkpoint per tile.
-
-    Parameters
-    ----------
-    north, east : (tiles * TILE + 1,) ndarray
-        Components of the ground acceleration, scaled to a peak of order one.
-    packed : (8, LANES) ndarray
-        Rows from `pack_steps`.
-    state : (4, LANES) ndarray
-        Rows: u and z under north, u and z under east, in the unit of the acceleration (over
-        ``omega²``); advanced to the last sample.
-    checkpoints : (TILES, 6, LANES) ndarray
-        Receives, per tile, the same four rows before it, then bounds of squared radius and squared
-        displacement over all azimuths at its samples.
-    """
-    # Local copies of a size that the compiler knows: it makes vectors
-    a11, a12, a21, a22 = packed[0].copy(), packed[1].copy(), packed[2].copy(), packed[3].copy()
-    b11, b12, b21, b22 = packed[4].copy(), packed[5].copy(), packed[6].copy(), packed[7].copy()
-    un, zn, ue, ze = state[0].copy(), state[1].copy(), state[2].copy(), state[3].copy()
-    radius, displacement = np.empty(LANES), np.empty(LANES)
-    for first in range(0, north.size - 1, TILE):
-        tile = first // TILE
-        _open_tile(un, zn, ue, ze, radius, displacement, checkpoints[tile])
-        for i in range(first, first + TILE, 2):
-            # Samples of two steps, of both components
-            n0, n1, n2 = north[i], north[i + 1], north[i + 2]
-            e0, e1, e2 = east[i], east[i + 1], east[i + 2]
-            for lane in range(LANES):
-                # Two steps under north (Nigam & Jennings)
-                u, z = un[lane], zn[lane]
-                u1 = a11[lane] * u + (a12[lane] * z + (b11[lane] * n0 + b12[lane] * n1))
-                z1 = a21[lane] * u + (a22[lane] * z + (b21[lane] * n0 + b22[lane] * n1))
-                u2 = a11[lane] * u1 + (a12[lane] * z1 + (b11[lane] * n1 + b12[lane] * n2))
-                z2 = a21[lane] * u1 + (a22[lane] * z1 + (b21[lane] * n1 + b22[lane] * n2))
-                un[lane], zn[lane] = u2, z2
-                # Two steps under east
-                u, z = ue[lane], ze[lane]
-                v1 = a11[lane] * u + (a12[lane] * z + (b11[lane] * e0 + b12[lane] * e1))
-                w1 = a21[lane] * u + (a22[lane] * z + (b21[lane] * e0 + b22[lane] * e1))
-                v2 = a11[lane] * v1 + (a12[lane] * w1 + (b11[lane] * e1 + b12[lane] * e2))
-                w2 = a21[lane] * v1 + (a22[lane] * w1 + (b21[lane] * e1 + b22[lane] * e2))
-                ue[lane], ze[lane] = v2, w2
-                # Squared displacement over all azimuths
-                displacement[lane] = max(displacement[lane], u1 * u1 + v1 * v1, u2 * u2 + v2 * v2)
-                # Bound of twice the larger eigenvalue after the first step: A, 2 B, C
-                a, b, c = u1 * u1 + z1 * z1, 2.0 * abs(u1 * v1 + z1 * w1), v1 * v1 + w1 * w1
-                d = abs(a - c)
-                early = a + c + max(b, d) + CHORD * min(b, d)
-                # The same after the second step
-                a, b, c = u2 * u2 + z2 * z2, 2.0 * abs(u2 * v2 + z2 * w2), v2 * v2 + w2 * w2
-                d = abs(a - c)
-                late = a + c + max(b, d) + CHORD * min(b, d)
-                # Squared radius over all azimuths
-                radius[lane] = max(radius[lane], 0.5 * max(early, late))
-        # Bounds of the tile
-        for lane in range(LANES):
-            checkpoints[tile, 4, lane], checkpoints[tile, 5, lane] = (
-                radius[lane],
-                displacement[lane],
-            )
-    # State for the next stretch of the record
-    for lane in range(LANES):
-        state[0, lane], state[1, lane] = un[lane], zn[lane]
-        state[2, lane], state[3, lane] = ue[lane], ze[lane]
 
 
 @kernel
@@ -173,38 +69,23 @@ def fill_forms(states, share, forms):
 
 
 @kernel
-def least_above(best, difference, product, cosines, sines):
-    """Return the smallest of whole groups of values minus a form without a mean, in parallel."""
-    # One accumulator for each place in a group
-    side = np.full(GROUP, np.inf)
-    for j in range(0, best.size, GROUP):
-        for k in range(GROUP):
-            above = best[j + k] - (difference * cosines[j + k] + product * sines[j + k])
-            side[k] = min(side[k], above)
-    smallest = side[0]
-    for k in range(1, GROUP):
-        smallest = min(smallest, side[k])
-    return smallest
-
-
-@kernel
-def floor_form(best, cosines, sines):
+def floor_form(best, cosines, sines, above):
     """
     Return a form that the largest squares exceed along every azimuth, and their smallest.
 
     A sample that does not exceed it cannot raise any of them. The form is their smallest, or their
-    first two Fourier coefficients lowered as far as needed, whichever has the larger mean.
+    first two Fourier coefficients lowered as far as needed, whichever has the larger mean. Memory
+    of the same size, ``above``, is overwritten.
     """
-    # Second Fourier coefficients of the largest squares
-    even, odd = np.zeros(GROUP), np.zeros(GROUP)
-    for j in range(0, best.size, GROUP):
-        for k in range(GROUP):
-            even[k] += best[j + k] * cosines[j + k]
-            odd[k] += best[j + k] * sines[j + k]
-    difference = 2.0 * even.sum() / best.size
-    product = 2.0 * odd.sum() / best.size
-    least = least_above(best, 0.0, 0.0, cosines, sines)
-    mean = least_above(best, difference, product, cosines, sines)
+    # Second Fourier coefficients of the largest squares, from every azimuth that begins a group
+    even = odd = 0.0
+    for k in range(0, best.size, GROUP):
+        even += best[k] * cosines[k]
+        odd += best[k] * sines[k]
+    difference, product = 2.0 * GROUP * even / best.size, 2.0 * GROUP * odd / best.size
+    for k in range(best.size):
+        above[k] = max(best[k] - (difference * cosines[k] + product * sines[k]), 0.0)
+    least, mean = smallest(best), smallest(above)
     return ((mean, difference, product) if mean > least else (least, 0.0, 0.0)), least
 
 
@@ -243,12 +124,12 @@ def _raise_to_four(forms, four, cosines, sines, best):
     for k in range(best.size):
         cosine, sine = cosines[k], sines[k]
         early = max(
-            mean_a + (difference_a * cosine + product_a * sine),
-            mean_b + (difference_b * cosine + product_b * sine),
+            (mean_a + difference_a * cosine) + product_a * sine,
+            (mean_b + difference_b * cosine) + product_b * sine,
         )
         late = max(
-            mean_c + (difference_c * cosine + product_c * sine),
-            mean_d + (difference_d * cosine + product_d * sine),
+            (mean_c + difference_c * cosine) + product_c * sine,
+            (mean_d + difference_d * cosine) + product_d * sine,
         )
         best[k] = max(best[k], early, late)
 
@@ -263,7 +144,7 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
     checkpoints : (TILES, 6, LANES) ndarray
-        From `run_azimuth_tiles`.
+        From `azimuth_tiles.run_azimuth_tiles`.
     oscillator : Oscillator
         Lane, phase of a step (rad), damping (fraction of critical), and share.
     directions : (5, n_azimuths) ndarray
@@ -276,29 +157,56 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
     lane, phase, damping, share = oscillator
     coefficients = step_coefficients(1.0, damping, phase)
     cosines, sines = directions[2], directions[3]
-    # Memory of one tile, and the bound of every tile that is still to be visited
+    # Memory of the leading tiles, and the bound of every tile that is still to be visited
     tiles = (north.size - 1) // TILE
-    states, forms, bounds = np.empty((4, TILE + 1)), np.empty((3, TILE + 1)), np.empty(tiles)
+    states, forms = np.empty((4, TILE + 1)), np.empty((LEADERS, 3, TILE + 1))
     marks, marked = np.empty(TILE + 1), np.zeros(TILE + 5, np.int64)
+    bounds, leaders, above = np.empty(tiles), np.zeros(LEADERS), np.empty(best.size)
     for tile in range(tiles):
         bounds[tile] = checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]
-    floor, least = floor_form(best, cosines, sines)
+    floor, least = floor_form(best, cosines, sines, above)
+    # Outermost samples of the tiles with the largest bounds
+    for leader in range(LEADERS):
+        tile = place_of_largest(bounds)
+        if bounds[tile] > least:
+            rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
+            fill_forms(states, share, forms[leader])
+            _raise_to_four(forms[leader], _outermost(forms[leader]), cosines, sines, best)
+            leaders[leader] = bounds[tile]
+            bounds[tile] = 0.0
+    floor, least = floor_form(best, cosines, sines, above)
     visited = 0
     for visit in range(LEADERS + tiles):
         # First the tiles with the largest bounds, then all others in order
-        tile = np.argmax(bounds) if visit < LEADERS else visit - LEADERS
-        if bounds[tile] > least:
-            bounds[tile] = 0.0
+        tile, number = max(visit - LEADERS, 0), min(visit, LEADERS - 1)
+        if (leaders[number] if visit < LEADERS else bounds[tile]) > least:
             # Samples of the tile that exceed the floor, four at a time
-            rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
-            fill_forms(states, share, forms)
-            for four in range(0, 4 * _mark_samples(forms, floor, marks, marked), 4):
+            if visit >= LEADERS:
+                rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
+                fill_forms(states, share, forms[number])
+            for four in range(0, 4 * _mark_samples(forms[number], floor, marks, marked), 4):
                 chosen = marked[four], marked[four + 1], marked[four + 2], marked[four + 3]
-                _raise_to_four(forms, chosen, cosines, sines, best)
+                _raise_to_four(forms[number], chosen, cosines, sines, best)
             # Raise the floor now and then
             visited += 1
-            if visit < LEADERS or visited % RENEWAL == 0:
-                floor, least = floor_form(best, cosines, sines)
+            if visited % RENEWAL == 0:
+                floor, least = floor_form(best, cosines, sines, above)
+
+
+@kernel
+def _outermost(forms):
+    """Return the samples of a tile with the largest squares along four azimuths."""
+    # Half sum, half difference and product make the squares along 0, 90, 45 and 135 degrees
+    values = np.empty((4, TILE + 1))
+    for i in range(TILE + 1):
+        values[0, i], values[1, i] = forms[0, i] + forms[1, i], forms[0, i] - forms[1, i]
+        values[2, i], values[3, i] = forms[0, i] + forms[2, i], forms[0, i] - forms[2, i]
+    return (
+        place_of_largest(values[0]),
+        place_of_largest(values[1]),
+        place_of_largest(values[2]),
+        place_of_largest(values[3]),
+    )
 
 
 @kernel

@@ -15,7 +15,6 @@ import numpy as np
 
 from per_obspy.kernels._jit import inlined, kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
-from per_obspy.kernels.oscillator.within_step import radius_bound, rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
     GROUP,
     Oscillator,
@@ -30,21 +29,6 @@ from per_obspy.kernels.spectra.tile_search import LANES, TILE
 
 #: Values stored of a listed step: three forms, states before it, accelerations at its ends.
 COLUMNS = 17
-
-
-@kernel
-def _slack(radius, peak, jump, oscillator):
-    """
-    Return by how much a square can exceed two samples of a tile between them.
-
-    ``(r²)' = -2 z b`` with ``b = 2 xi z + a``, ``(u²)' = 2 u z``.
-    """
-    _, phase, damping, share = oscillator
-    # Bound of the first derivative of z, times the phase of a step
-    z1, _, square = rate_bounds(radius, peak, jump, damping, phase)
-    if share == 0.0:
-        square = 2.0 * (phase * radius * radius + radius * z1)  # (u²)'' = 2 z² + 2 u z'
-    return 0.125 * phase * square
 
 
 @inlined
@@ -148,7 +132,7 @@ def _mark_steps(coefficients, floor, marks):
 
 
 @kernel
-def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, best, steps):
+def list_steps(north, east, checkpoints, oscillator, directions, best, steps):
     """
     List the steps of one oscillator that may hold more than the largest squares at the samples.
 
@@ -156,11 +140,8 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
     ----------
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
-    peaks, jumps : (2, tiles) ndarray
-        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
-        either component.
     checkpoints : (TILES, 6, LANES) ndarray
-        From `azimuth_samples.run_azimuth_tiles`.
+        From `azimuth_tiles.run_azimuth_tiles`.
     oscillator : Oscillator
         Lane, phase of a step (rad), damping (fraction of critical), and share: 1 for the radius, 0
         for the displacement.
@@ -185,16 +166,11 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
     states, forms = np.empty((4, TILE + 1)), np.empty((3, TILE + 1))
     slopes = np.empty((3, TILE + 1))
     coefficients, bulges, marks = np.empty((3, 3, TILE)), np.empty(TILE), np.empty(TILE)
-    floor, least = floor_form(best, directions[2], directions[3])
+    floor, least = floor_form(best, directions[2], directions[3], np.empty(best.size))
     count = 0
-    for tile in range(peaks.shape[1]):
+    for tile in range((north.size - 1) // TILE):
         # Leave out a tile whose bound does not reach the smallest of the largest squares
-        peak = math.hypot(peaks[0, tile], peaks[1, tile])
-        jump = math.hypot(jumps[0, tile], jumps[1, tile])
-        radius = radius_bound(checkpoints[tile, 4, lane], peak, damping, phase)
-        slack = _slack(radius, peak, jump, oscillator)
-        sampled = checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]
-        if sampled + slack <= least:
+        if (checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]) <= least:
             continue
         # Squares and slopes at the samples, and the Bernstein coefficients between them
         first = tile * TILE
@@ -345,7 +321,7 @@ def _add_problems(step, first, directions, best, largest, problems, azimuths, co
 
 @kernel
 def raise_azimuths(
-    north, east, peaks, jumps, checkpoints, phases, dampings, share, exact, directions, edges, best
+    north, east, checkpoints, phases, dampings, share, exact, directions, edges, best
 ):
     """
     Raise the largest squares of all oscillators along all azimuths to those of a stretch.
@@ -354,11 +330,8 @@ def raise_azimuths(
     ----------
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
-    peaks, jumps : (2, tiles) ndarray
-        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
-        either component.
     checkpoints : (TILES, 6, LANES) ndarray
-        From `azimuth_samples.run_azimuth_tiles`.
+        From `azimuth_tiles.run_azimuth_tiles`.
     phases, dampings : (LANES,) ndarray
         Phase ``omega * dt`` of a step, rad; fraction of critical.
     share : float
@@ -371,14 +344,12 @@ def raise_azimuths(
         Largest squares of the first oscillators of the block, raised in place, in the squared unit
         of the acceleration (over ``omega⁴``).
     """
-    steps = np.empty((peaks.shape[1] * TILE, COLUMNS))
+    steps = np.empty((north.size - 1, COLUMNS))
     for lane in range(best.shape[0]):
         oscillator = Oscillator(lane, phases[lane], dampings[lane], share)
         largest = best[lane]
         raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, largest)
         # Between the samples only where the bounds of a step allow more
         if exact:
-            count = list_steps(
-                north, east, peaks, jumps, checkpoints, oscillator, directions, largest, steps
-            )
+            count = list_steps(north, east, checkpoints, oscillator, directions, largest, steps)
             search_steps(steps[:count], oscillator, directions, edges, largest)

@@ -141,20 +141,23 @@ def _evaluate(series, phases, values, slopes):
 @kernel
 def _find_roots(condition, phase, roots, doubts):
     """Fill the root of each condition within the step, or its start; mark the lanes in doubt."""
-    higher, values, slopes = np.zeros(LANES), np.empty(LANES), np.empty(LANES)
+    bends, values, slopes = np.zeros(LANES), np.empty(LANES), np.empty(LANES)
     highest, tolerances = np.empty(LANES), np.empty(LANES)
-    # Bound of the terms above the linear one
+    # Bound of the second derivative
     for n in range(condition.shape[0] - 1, 1, -1):
         for lane in range(LANES):
-            higher[lane] = higher[lane] * phase + n * abs(condition[n, lane])
+            bends[lane] = bends[lane] * phase + (n * (n - 1)) * abs(condition[n, lane])
     roots[:] = phase
     _evaluate(condition, roots, values, slopes)
     for lane in range(LANES):
-        # One root at most where the linear term outweighs the others; begin at that of the chord
+        # One root at most where the slope keeps its sign; begin at that of the chord
         start, end = condition[0, lane], values[lane]
-        steep = higher[lane] * phase < abs(condition[1, lane])
+        steep = bends[lane] * phase < abs(condition[1, lane])
         crossing = steep and start * end < 0.0
-        doubts[lane] = doubts[lane] if steep else 1.0
+        # None where the chord keeps further from zero than the condition from the chord
+        sag = 0.125 * phase * phase * bends[lane]
+        clear = start * end > 0.0 and min(abs(start), abs(end)) > sag
+        doubts[lane] = doubts[lane] if steep or clear else 1.0
         roots[lane] = phase * start / (start - end) if crossing else 0.0
         # Lanes without a root stay at the start of the step
         highest[lane] = phase if crossing else 0.0

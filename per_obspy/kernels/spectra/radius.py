@@ -16,6 +16,7 @@ import numpy as np
 from per_obspy.kernels._aligned import aligned
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.exact_stride import fill_stride_weights
 from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE, raise_to_tiles
 
 #: Steps after which the radius is looked at. The more, the fewer operations per step, and the more
@@ -61,18 +62,9 @@ def pack(phases, dampings, table):
             table[STEP + row, lane] = coefficients[row]
         for row in range(4):
             table[MATRIX + row, lane] = stride_matrix[row]
-        # Weights of the samples: those of a step, moved on by the steps after it
-        a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
-        for sample in range(STRIDE):
-            for earlier in range(sample + 1):
-                u, z = table[DISPLACED + earlier, lane], table[MOVED + earlier, lane]
-                table[DISPLACED + earlier, lane] = a11 * u + a12 * z
-                table[MOVED + earlier, lane] = a21 * u + a22 * z
-            # The step itself: its first sample was the last one of the step before
-            table[DISPLACED + sample, lane] += b11
-            table[MOVED + sample, lane] += b21
-            table[DISPLACED + sample + 1, lane] = b12
-            table[MOVED + sample + 1, lane] = b22
+        # Weights of the samples of a stride
+        displaced, moved = table[DISPLACED:MOVED, lane], table[MOVED:STEP, lane]
+        fill_stride_weights(coefficients, STRIDE, displaced, moved)
 
 
 @kernel

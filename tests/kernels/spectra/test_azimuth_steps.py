@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
-from per_obspy.kernels.spectra import azimuth_samples, azimuth_steps
+from per_obspy.kernels.spectra import azimuth_samples, azimuth_steps, azimuth_tiles
 from per_obspy.kernels.spectra.azimuth_samples import GROUP, Oscillator
 from per_obspy.kernels.spectra.tile_search import LANES, TILE, tile_extremes
 
@@ -33,10 +33,10 @@ def _extremes(ground):
 
 
 def _checkpoints(ground, phase, damping):
-    packed, state = np.empty((8, LANES)), np.zeros((4, LANES))
+    table = np.empty((azimuth_tiles.ROWS, LANES))
     checkpoints = np.empty(((ground.shape[1] - 1) // TILE, 6, LANES))
-    azimuth_samples.pack_steps(np.full(LANES, phase), np.full(LANES, damping), packed)
-    azimuth_samples.run_azimuth_tiles(*ground, packed, state, checkpoints)
+    azimuth_tiles.pack(np.full(LANES, phase), np.full(LANES, damping), table)
+    azimuth_tiles.run_azimuth_tiles(*ground, *_extremes(ground), table, checkpoints)
     return checkpoints
 
 
@@ -67,9 +67,7 @@ def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share, 
     oscillator = Oscillator(0, phase, damping, share)
     best, steps = np.zeros(ANGLES.size), np.empty((4 * TILE, azimuth_steps.COLUMNS))
     azimuth_samples.raise_azimuths_to_samples(*ground, checkpoints, oscillator, DIRECTIONS, best)
-    count = azimuth_steps.list_steps(
-        *ground, *_extremes(ground), checkpoints, oscillator, DIRECTIONS, best, steps
-    )
+    count = azimuth_steps.list_steps(*ground, checkpoints, oscillator, DIRECTIONS, best, steps)
     states = _fine_states(ground, phase, damping, plain_states)
     along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
     squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
