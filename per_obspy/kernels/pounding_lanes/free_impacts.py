@@ -152,6 +152,7 @@ def state_inside_step(pair, row, i, start, change, share):
 def states_inside_step(pair, row, left, right, change, share):
     """Return ``state_inside_step`` of both structures: two series in one loop take less time."""
     cubic = slope = other_cubic = other_slope = 0.0
+    # Horner's rule
     for n in range(int(row[0, TERM_COUNT]) - 1, 2, -1):
         slope = slope * share + cubic
         cubic = cubic * share + row[0, RAMP_RESPONSE + n]
@@ -209,6 +210,7 @@ def _clearance_series(pair, left, right, change, duration):
     second = STRUCTURE_ROWS
     omega = pair[OMEGA] * duration
     other_omega = pair[second + OMEGA] * duration
+    # rates of both accelerations, then the coefficients of their difference
     rate = _acceleration_rate(pair, 0, left, change)
     other_rate = _acceleration_rate(pair, second, right, change)
     value = _clearance(pair, left, right)

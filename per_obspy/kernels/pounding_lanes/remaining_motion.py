@@ -67,6 +67,7 @@ def remains_still(row, cosine, sine, sizes, duration, group):
         True is certain.
     """
     direction = abs(cosine), abs(sine)
+    # linear pairs that never hit each other, or do from the start
     if row[0, YIELD] == math.inf and row[1, YIELD] == math.inf:
         if _moves_as_one(row):
             return _free_pair_remains_still(row, direction, sizes, duration, group, math.inf)

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import is_lingering
 from per_obspy.kernels.pounding_lanes import free_impacts, lanes
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
@@ -127,6 +128,45 @@ def test_the_clearance_is_zero_where_they_meet():
             assert_allclose(hit[i][:2], expected[:2], rtol=1e-12, atol=1e-16)  # rounding
         met += 1
     assert met > 10
+
+
+def test_most_impacts_need_one_correction():
+    # catches: a first guess by the parabola only, or by a wrong quartic
+    pair, row = resting_pair()
+    guesses, improved = [], []
+    for left, right, *ends, ground_start, ground_end in cases(pair, row, 400, seed=2):
+        if (
+            free_impacts.predict_clearance(pair, left, right, *ends, 1.0)
+            == free_impacts.CLOSES_ONCE
+        ):
+            segment = segment_of_step(row, ground_start, ground_end, DURATION)
+            time, *_ = free_impacts.locate_impact(pair, row, left, right, *ends, 1.0, segment)
+            change = ground_end - ground_start
+            series, _ = free_impacts._clearance_series(pair, left, right, change, DURATION)
+            end = free_impacts._clearance(pair, *ends)
+            guess = free_impacts._first_guess(*series[:2], end)
+            guesses.append(abs(guess - time))
+            improved.append(abs(free_impacts._improved_guess(series, end, 1.0, guess) - time))
+    assert len(improved) > 20
+    # one correction is enough where the cubic from there is exact
+    assert np.mean(np.array(improved) < free_impacts.CUBIC_SHARE) > 0.8
+    assert np.median(improved) < 0.01 * np.median(guesses)
+
+
+def test_bounces_end_as_in_the_event_code():
+    # catches: accelerations of the two structures exchanged, one of the three limits left out
+    pair, row = resting_pair()
+    ends = []
+    for left, right, _, _, ground, _ in cases(pair, row, 300, seed=3):
+        for count, speed, delay in ((0.0, 1e-12, 1e-3), (0.0, 1e-2, 0.0), (25.0, 0.0, 0.0)):
+            row[0, columns.BOUNCES] = count
+            row[0, columns.STICKING_SPEED], row[0, columns.STICKING_DELAY] = speed, delay
+            free_impacts.set_states(pair, left, right)
+            load_pair(pair, row)
+            expected = is_lingering(row, 0, ground)
+            assert free_impacts._bounces_end(pair, row, left, right) == expected
+            ends.append(expected)
+    assert 0.4 < np.mean(ends) < 0.9
 
 
 def turning_points(pair):
