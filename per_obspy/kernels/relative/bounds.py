@@ -14,9 +14,13 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel, lean
+from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._jit import kernel, lean, vectorised
 from per_obspy.kernels.relative.relative_samples import STATE_PEAKS, shift_of
-from per_obspy.kernels.spectra.tile_search import TILE
+from per_obspy.kernels.spectra.tile_search import SIDE, TILE
+
+#: Where the parts of a tile's largest size, largest change and sum of the sizes begin in a line.
+PEAK, JUMP, SUM = 0, SIDE, 2 * SIDE
 
 
 @kernel
@@ -26,21 +30,41 @@ def tile_inputs(ground, dt):
 
     Rows: largest acceleration, largest rate of change, and integral over the tile of the size.
     """
-    inputs = np.zeros(((ground.shape[1] - 1) // TILE, 3, 2))
-    for tile in range(inputs.shape[0]):
+    tiles = (ground.shape[1] - 1) // TILE
+    inputs, parts = np.empty((tiles, 3, 2)), aligned(1, 3 * SIDE)[0]
+    for tile in range(tiles):
         for component in range(2):
-            integral = 0.0
+            samples = ground[component, tile * TILE : (tile + 1) * TILE + 1]
+            _gather_sizes(samples, parts)
+            # The largest of all parts, and their sum
+            peak, jump, total = abs(samples[0]), 0.0, 0.0
+            for k in range(SIDE):
+                peak, jump = max(peak, parts[PEAK + k]), max(jump, parts[JUMP + k])
+                total += parts[SUM + k]
             # Integral of the size by the trapezoidal rule, an upper bound
-            for i in range(tile * TILE, (tile + 1) * TILE):
-                start, end = ground[component, i], ground[component, i + 1]
-                integral += 0.5 * (abs(start) + abs(end))
-                # Largest acceleration and rate of change
-                peak = max(inputs[tile, 0, component], abs(start), abs(end))
-                inputs[tile, 0, component] = peak
-                rate = max(inputs[tile, 1, component], abs(end - start) / dt)
-                inputs[tile, 1, component] = rate
+            integral = total + 0.5 * (abs(samples[0]) - abs(samples[TILE]))
+            inputs[tile, 0, component], inputs[tile, 1, component] = peak, jump / dt
             inputs[tile, 2, component] = integral * dt
     return inputs
+
+
+@vectorised
+def _gather_sizes(samples, parts):
+    """
+    Fill the largest size, largest change per step and sum of the sizes of a tile, in 8 parts each.
+
+    Its first sample is left out.
+    """
+    for k in range(3 * SIDE):
+        parts[k] = 0.0
+    for i in range(0, TILE, 2 * SIDE):
+        for k in range(SIDE):
+            # Ends of two steps, one in each half of 16 steps
+            start, end = samples[i + k], samples[i + k + 1]
+            later, last = samples[i + SIDE + k], samples[i + SIDE + k + 1]
+            parts[PEAK + k] = max(parts[PEAK + k], abs(end), abs(last))
+            parts[JUMP + k] = max(parts[JUMP + k], abs(end - start), abs(last - later))
+            parts[SUM + k] += abs(end) + abs(last)
 
 
 @kernel

@@ -71,6 +71,19 @@ def motion(pair, parts):
     return np.array(samples), np.array(within)
 
 
+def test_strongest_motion_of_tiles():
+    # mutation: the first or the last sample of a tile left out, or one of the parts
+    for place in (0, 1, TILE // 2, TILE - 1, TILE, TILE + 5, 2 * TILE):
+        ground = np.random.default_rng(place).uniform(-1.0, 1.0, (2, 2 * TILE + 1))
+        ground[0, place] *= -9.0
+        inputs = tile_inputs(ground, DT)
+        for tile in range(2):
+            samples = abs(ground[:, tile * TILE : (tile + 1) * TILE + 1])
+            changes = abs(np.diff(ground[:, tile * TILE : (tile + 1) * TILE + 1]))
+            expected = samples.max(axis=1), changes.max(axis=1) / DT, np.trapezoid(samples, dx=DT)
+            np.testing.assert_allclose(inputs[tile], expected, rtol=1e-14)
+
+
 @pytest.mark.parametrize(
     "pair",
     [
