@@ -271,7 +271,7 @@ def _block_squares(
         azimuth_tiles.run_azimuth_tiles(*stretch[:4], table, tile_states)
         for share, squares in zip(shares, largest, strict=True):
             azimuth_steps.raise_azimuths(
-                *stretch[:2], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
+                *stretch[:4], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
             )
 
     # In free vibration the radius never grows, the displacement may

@@ -67,7 +67,9 @@ def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share, 
     oscillator = Oscillator(0, phase, damping, share)
     best, steps = np.zeros(ANGLES.size), np.empty((4 * TILE, azimuth_steps.COLUMNS))
     azimuth_samples.raise_azimuths_to_samples(*ground, checkpoints, oscillator, DIRECTIONS, best)
-    count = azimuth_steps.list_steps(*ground, checkpoints, oscillator, DIRECTIONS, best, steps)
+    count = azimuth_steps.list_steps(
+        *ground, *_extremes(ground), checkpoints, oscillator, DIRECTIONS, best, steps
+    )
     states = _fine_states(ground, phase, damping, plain_states)
     along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
     squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
