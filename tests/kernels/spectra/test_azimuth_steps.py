@@ -100,7 +100,7 @@ def test_tiles_without_a_sample_above_the_maxima_are_still_listed(period, share,
     states = _fine_states(ground, phase, damping, plain_states)
     along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
     squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
-    best = 1.001 * squares[::PARTS].max(axis=0)
+    best = np.full(ANGLES.size, 1.01 * squares[::PARTS].max())
     steps = np.empty((4 * TILE, azimuth_steps.COLUMNS))
     oscillator = Oscillator(0, phase, damping, share)
     count = azimuth_steps.list_steps(
