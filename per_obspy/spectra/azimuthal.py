@@ -169,6 +169,7 @@ def _spectra(
 
     # The kernels take azimuths of a half turn in ascending order
     ascending = np.argsort(half_turn)
+    places = np.argsort(ascending)
     fan = _fan(np.radians(half_turn[ascending]))
 
     # Oscillators whose steps are cut into equally many parts run together
@@ -178,9 +179,9 @@ def _spectra(
         chosen = np.flatnonzero(parts == count)
         oscillators = prepare_oscillators(dt / count, periods[chosen], dampings[chosen])
         record = _record_with_steps_cut(components, count)
-        found = _lengths(record, oscillators, fan, shares, exact)[:, :, : half_turn.size]
+        found = _lengths(record, oscillators, fan, shares, exact)
         # Back to the order of the arguments
-        lengths[:, chosen[:, np.newaxis], ascending] = found
+        lengths[:, chosen] = np.take(found, places, axis=2)
     return [spectrum.reshape(*shape, half_turn.size) for spectrum in lengths]
 
 
@@ -201,7 +202,7 @@ def _lengths(
     work = partial(_block_squares, record, shares=shares, fan=fan, exact=exact)
     squares = over_blocks(work, oscillators, record)
     lengths = np.sqrt(squares) / oscillators.omegas**2 * record.scale
-    return lengths.reshape(len(shares), -1, oscillators.size).transpose(0, 2, 1)
+    return lengths.T.reshape(oscillators.size, len(shares), -1).swapaxes(0, 1)
 
 
 def _parts(phases: FloatArray, exact: bool) -> NDArray[np.int64]:
@@ -270,14 +271,15 @@ def _block_squares(
         azimuth_tiles.run_azimuth_tiles(*stretch[:4], table, tile_states)
         for share, squares in zip(shares, largest, strict=True):
             azimuth_steps.raise_azimuths(
-                *stretch[:2], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
+                *stretch[:4], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
             )
 
     # In free vibration the radius never grows, the displacement may
     if DISPLACEMENT in shares:
         displacements = largest[shares.index(DISPLACEMENT)]
         kernels.free_displacements(table[:4], block.dampings, block.size, fan[0], displacements)
-    return np.concatenate([squares.T for squares in largest])
+    # In memory, azimuths stay next to each other
+    return np.concatenate(largest, axis=1).T
 
 
 def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:

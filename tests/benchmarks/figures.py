@@ -6,6 +6,10 @@ Figures of all benchmarks: one JSON file, and ``docs/benchmarks.md`` made of it.
 runs the benchmarks (or only some scripts) and writes the page. Their figures replace those of the
 same machine in the file; those of other machines stay. A script calls `note` for every figure; run
 alone, it only prints.
+
+Vectors are as wide as the command line chooses them; it leaves the choice to the compiler where
+``NUMBA_CPU_NAME`` (e.g. as `llvmlite.binding.get_host_cpu_name` returns it) or
+``NUMBA_CPU_FEATURES`` is set.
 """
 
 import json
@@ -20,6 +24,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from per_obspy.full_vectors import FULL_WIDTH, use_full_vectors
 
 FOLDER = Path(__file__).parent
 PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
@@ -83,13 +89,22 @@ def _version(distribution: str) -> str:
 
 
 def machine() -> str:
-    """Return processor, number of processors, system and Python in words."""
+    """Return processor, width of vectors, number of processors, system and Python in words."""
     model = platform.processor() or platform.machine()
     if Path("/proc/cpuinfo").is_file():
         named = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text("utf-8"))
         model = named[1] if named else model
     system = f"{platform.system()}, Python {platform.python_version()}"
-    return f"{model}, {os.cpu_count()} processors, {system}"
+    is_full = FULL_WIDTH in os.environ.get("NUMBA_CPU_FEATURES", "")
+    vectors = "vectors of full width" if is_full else "width of vectors by the compiler"
+    return f"{model}, {vectors}, {os.cpu_count()} processors, {system}"
+
+
+def choose_vectors() -> None:
+    """Choose the width of vectors for a benchmark, before Numba is imported, and print it."""
+    if Path(sys.argv[0]).resolve().parent == FOLDER.resolve():
+        use_full_vectors()
+        print(machine(), flush=True)
 
 
 def revision() -> str:
@@ -205,6 +220,9 @@ def main(path: Path, scripts: list[str]) -> None:
     path.write_text(json.dumps({"figures": figures}, indent=1) + "\n", "utf-8")
     PAGE.write_text(page(figures, TEMPLATE.read_text("utf-8")), "utf-8")
 
+
+# Every benchmark imports this module before Numba
+choose_vectors()
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]), sys.argv[2:])

@@ -111,3 +111,11 @@ def test_the_page_of_the_repository_is_that_of_its_figures():
     found = figures.read(Path(figures.PAGE).with_suffix(".json"))
     template = figures.TEMPLATE.read_text(encoding="utf-8")
     assert figures.PAGE.read_text(encoding="utf-8") == figures.page(found, template)
+
+
+def test_the_machine_has_the_width_of_its_vectors(monkeypatch):
+    # mutation: figures of both widths that cannot be told apart
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", f"+avx512f,{figures.FULL_WIDTH}")
+    assert "vectors of full width" in figures.machine()
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", "+avx512f")
+    assert "width of vectors by the compiler" in figures.machine()

@@ -98,7 +98,7 @@ def excess_over_floor(mean, difference, product, floor):
 
 
 @kernel
-def _mark_samples(forms, floor, marks, marked):
+def mark_samples(forms, floor, marks, marked):
     """List the samples of a tile above the floor, filled up to fours; return how many fours."""
     for i in range(TILE + 1):
         marks[i] = excess_over_floor(forms[0, i], forms[1, i], forms[2, i], floor)
@@ -184,7 +184,7 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
             if visit >= LEADERS:
                 rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
                 fill_forms(states, share, forms[number])
-            for four in range(0, 4 * _mark_samples(forms[number], floor, marks, marked), 4):
+            for four in range(0, 4 * mark_samples(forms[number], floor, marks, marked), 4):
                 chosen = marked[four], marked[four + 1], marked[four + 2], marked[four + 3]
                 _raise_to_four(forms[number], chosen, cosines, sines, best)
             # Raise the floor now and then

@@ -15,12 +15,14 @@ import numpy as np
 
 from per_obspy.kernels._jit import inlined, kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.within_step import rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
     GROUP,
     Oscillator,
     excess_over_floor,
     fill_forms,
     floor_form,
+    mark_samples,
     raise_azimuths_to_samples,
     rerun_tile,
 )
@@ -29,6 +31,21 @@ from per_obspy.kernels.spectra.tile_search import LANES, TILE
 
 #: Values stored of a listed step: three forms, states before it, accelerations at its ends.
 COLUMNS = 17
+
+
+@kernel
+def _slack(radius, peak, jump, oscillator):
+    """
+    Return by how much a square can exceed two samples of a tile between them.
+
+    ``(r²)' = -2 z b`` with ``b = 2 xi z + a``, ``(u²)' = 2 u z``.
+    """
+    _, phase, damping, share = oscillator
+    # Bound of the first derivative of z, times the phase of a step
+    z1, _, square = rate_bounds(radius, peak, jump, damping, phase)
+    if share == 0.0:
+        square = 2.0 * (phase * radius * radius + radius * z1)  # (u²)'' = 2 z² + 2 u z'
+    return 0.125 * phase * square
 
 
 @inlined
@@ -132,7 +149,7 @@ def _mark_steps(coefficients, floor, marks):
 
 
 @kernel
-def list_steps(north, east, checkpoints, oscillator, directions, best, steps):
+def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, best, steps):
     """
     List the steps of one oscillator that may hold more than the largest squares at the samples.
 
@@ -140,6 +157,9 @@ def list_steps(north, east, checkpoints, oscillator, directions, best, steps):
     ----------
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
+    peaks, jumps : (2, tiles) ndarray
+        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
+        either component.
     checkpoints : (TILES, 6, LANES) ndarray
         From `azimuth_tiles.run_azimuth_tiles`.
     oscillator : Oscillator
@@ -166,6 +186,7 @@ def list_steps(north, east, checkpoints, oscillator, directions, best, steps):
     states, forms = np.empty((4, TILE + 1)), np.empty((3, TILE + 1))
     slopes = np.empty((3, TILE + 1))
     coefficients, bulges, marks = np.empty((3, 3, TILE)), np.empty(TILE), np.empty(TILE)
+    sample_marks, marked = np.empty(TILE + 1), np.zeros(TILE + 5, np.int64)
     floor, least = floor_form(best, directions[2], directions[3], np.empty(best.size))
     count = 0
     for tile in range((north.size - 1) // TILE):
@@ -176,6 +197,13 @@ def list_steps(north, east, checkpoints, oscillator, directions, best, steps):
         first = tile * TILE
         rerun_tile(north, east, checkpoints, tile, lane, exact, states)
         fill_forms(states, share, forms)
+        # Leave out a tile without a sample that comes close enough to the floor
+        peak = math.hypot(peaks[0, tile], peaks[1, tile])
+        jump = math.hypot(jumps[0, tile], jumps[1, tile])
+        slack = _slack(math.sqrt(checkpoints[tile, 4, lane]), peak, jump, oscillator)
+        lowered = floor[0] - slack, floor[1], floor[2]
+        if mark_samples(forms, lowered, sample_marks, marked) == 0:
+            continue
         tile_north, tile_east = north[first : first + TILE + 1], east[first : first + TILE + 1]
         _fill_slopes(states, tile_north, tile_east, oscillator, slopes)
         _fill_bulges(states, tile_north, tile_east, oscillator, bulges)
@@ -321,7 +349,7 @@ def _add_problems(step, first, directions, best, largest, problems, azimuths, co
 
 @kernel
 def raise_azimuths(
-    north, east, checkpoints, phases, dampings, share, exact, directions, edges, best
+    north, east, peaks, jumps, checkpoints, phases, dampings, share, exact, directions, edges, best
 ):
     """
     Raise the largest squares of all oscillators along all azimuths to those of a stretch.
@@ -330,6 +358,9 @@ def raise_azimuths(
     ----------
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
+    peaks, jumps : (2, tiles) ndarray
+        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
+        either component.
     checkpoints : (TILES, 6, LANES) ndarray
         From `azimuth_tiles.run_azimuth_tiles`.
     phases, dampings : (LANES,) ndarray
@@ -351,5 +382,7 @@ def raise_azimuths(
         raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, largest)
         # Between the samples only where the bounds of a step allow more
         if exact:
-            count = list_steps(north, east, checkpoints, oscillator, directions, largest, steps)
+            count = list_steps(
+                north, east, peaks, jumps, checkpoints, oscillator, directions, largest, steps
+            )
             search_steps(steps[:count], oscillator, directions, edges, largest)

@@ -67,7 +67,9 @@ def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share, 
     oscillator = Oscillator(0, phase, damping, share)
     best, steps = np.zeros(ANGLES.size), np.empty((4 * TILE, azimuth_steps.COLUMNS))
     azimuth_samples.raise_azimuths_to_samples(*ground, checkpoints, oscillator, DIRECTIONS, best)
-    count = azimuth_steps.list_steps(*ground, checkpoints, oscillator, DIRECTIONS, best, steps)
+    count = azimuth_steps.list_steps(
+        *ground, *_extremes(ground), checkpoints, oscillator, DIRECTIONS, best, steps
+    )
     states = _fine_states(ground, phase, damping, plain_states)
     along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
     squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
@@ -85,6 +87,28 @@ def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share, 
     radius = np.sqrt((states**2).sum(axis=(1, 2)).max())
     curvature = 2.0 * (peak * (peak + 1.1 * radius) + radius * 2.0 * peak / phase)
     assert_allclose(best, dense, rtol=1e-11, atol=(phase / PARTS) ** 2 / 8 * curvature)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("period", [4.0, 11.0])
+def test_tiles_without_a_sample_above_the_maxima_are_still_listed(period, share, plain_states):
+    # catches a tile that is left out by its samples alone: maxima a little above all samples are
+    # exceeded between them
+    damping, phase = 0.05, 2.0 * np.pi / period
+    ground = _record(4)
+    checkpoints = _checkpoints(ground, phase, damping)
+    states = _fine_states(ground, phase, damping, plain_states)
+    along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
+    squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
+    best = np.full(ANGLES.size, 1.01 * squares[::PARTS].max())
+    steps = np.empty((4 * TILE, azimuth_steps.COLUMNS))
+    oscillator = Oscillator(0, phase, damping, share)
+    count = azimuth_steps.list_steps(
+        *ground, *_extremes(ground), checkpoints, oscillator, DIRECTIONS, best, steps
+    )
+    assert np.any(squares.max(axis=0) > best)
+    azimuth_steps.search_steps(steps[:count], oscillator, DIRECTIONS, _edges(), best)
+    assert np.all(squares.max(axis=0) <= best * (1 + 1e-11))
 
 
 def _dense_step(states, ground, phase, damping, parts):
