@@ -103,6 +103,7 @@ def test_a_quiet_row_is_still_and_an_excited_one_is_not(gaps):
     assert not is_still(row_of(1e-5, gaps), late)
     assert is_still(row_of(1e-5, gaps), late, direction=(0.0, 1.0))
     assert is_still(row_of(1e-5, gaps), late, group=31)
+    assert not is_still(row_of(1e-5, gaps), late[::-1], direction=(0.6, -0.8))
     for i in range(3):
         row = row_of(1e-5, gaps)
         row[i, columns.LARGEST_DISPLACEMENT] = 1e-6
@@ -123,6 +124,27 @@ def test_impacts_that_count_keep_a_row_going():
     row = row_of([1e-9, -1e-9, 1e-9], (0.0, 0.0))
     row[1, columns.APPROACH] = 0.0
     assert not is_still(row)
+
+
+def test_an_approach_takes_the_energy_of_a_group():
+    # catches: the speed of one of both buildings
+    row = row_of(0.0, (0.0, 0.05))
+    row[0, columns.V] = 1e-2
+    # at most 1e-2 m/s times the root of two, against 1 % of the fastest
+    for fastest, expected in ((1.45, True), (1.38, False)):
+        row[:2, columns.APPROACH] = fastest
+        assert is_still(row) == expected
+
+
+def test_the_building_beside_a_gap_reaches_it():
+    # catches: the reach of the other end of a group; the slower building is beside the gap
+    row = row_of(0.0, (0.0, 0.05), fastest=100.0)
+    both = [columns.STIFFNESS, columns.DAMPING_RATE]
+    row[:2, both] = row[1::-1, both]
+    # 0.045 m at most, then 0.054 m; the first building alone 0.032 m
+    for speed, expected in ((0.28, True), (0.34, False)):
+        row[0, columns.V] = speed
+        assert is_still(row) == expected
 
 
 @pytest.mark.parametrize("gaps", [(0.0, 0.05), (0.05, 0.0)])
