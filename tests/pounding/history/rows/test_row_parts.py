@@ -110,6 +110,10 @@ def test_only_a_certain_gap_divides():
     nearly = np.array([0.1, 0.1 * (1.0 - 1e-10), 0.1])
     assert_array_equal(stays_open(rows, nearly), [False, True, True])
     assert_array_equal(stays_open(rows, 0.99 * reached), [True, True, True])
+    # a row ends after its last building, however far that moves
+    assert stays_open(rows, np.array([0.0, 0.0, 9.0]))[2]
+    rows.participation_left[2] = 1.5
+    assert_array_equal(stays_open(rows, np.array([0.0, 0.1, 0.14])), [True, False, True])
     assert not stays_open(checked_rows(row_of([0.0], [1.0] * 2, [1.0] * 2)), np.zeros(2))[0]
 
 
