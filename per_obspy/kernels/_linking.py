@@ -9,15 +9,65 @@ code only; a kernel that Python calls links the code of all, and generates machi
 Scalar functions are not even optimised before that. Those with loops over arrays are: the loops
 become vectors before they are merged into their callers, without which spectra take some percent
 longer.
+
+Half of the time goes into Numba's own Python code. Three things shorten it: no search for garbage
+meanwhile, options that compare quickly, and no passes for what kernels do not contain.
 """
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from numba.core import event, sigutils
+from numba.core import event, sigutils, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+
+#: Passes for closures, comprehensions, ``with``, and loops over tuples of several types.
+UNUSED_PASSES = {
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+}
+
+#: Value of every compiler option that is not set.
+DEFAULTS = {name: option.default for name, option in Flags.options.items()}
+
+
+class QuickFlags(Flags):
+    """Compiler options of one function, which Numba compares with others some 100 000 times."""
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        """Return what Numba returns: it is the same for all options."""
+        return OPTIONS_HASH
+
+    def values(self) -> dict[str, Any]:
+        """Return the values by name, without a call for each."""
+        return DEFAULTS | self._values
+
+
+OPTIONS_HASH = hash(Flags())
+
+
+@contextmanager
+def kept_garbage() -> Iterator[None]:
+    """Search for no garbage in cycles: compilation makes many objects and few cycles."""
+    is_searched = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if is_searched:
+            gc.enable()
 
 
 class KernelLibrary(JITCodeLibrary):
@@ -40,6 +90,10 @@ class KernelLibrary(JITCodeLibrary):
         # followed by one of each library that it calls.
         return list(dict.fromkeys(reversed(self._linking_libraries)))[::-1]
 
+    def _optimize_functions(self, module: Any) -> None:
+        """Leave the optimisation to the whole; only set the layout of data for it."""
+        module.data_layout = self._codegen._data_layout
+
 
 class FunctionLibrary(KernelLibrary):
     """Intermediate code of a function and of those that it calls, optimised."""
@@ -56,16 +110,28 @@ class FunctionLibrary(KernelLibrary):
 class LeanLibrary(FunctionLibrary):
     """Intermediate code of one function; the functions that it calls are listed, not linked."""
 
-    def _optimize_functions(self, module: Any) -> None:
-        """Leave the optimisation to the kernel; only set the layout of data for it."""
-        module.data_layout = self._codegen._data_layout
-
     def finalize(self) -> None:
         """End the changes."""
         self._finalized = True
 
 
-class KernelCompiler(Compiler):
+class LeanPipeline(Compiler):
+    """Numba's compiler without what kernels do not need."""
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile a function of Python, with options that compare quickly."""
+        self.state.flags = QuickFlags(self.state.flags)
+        with kept_garbage():
+            return super().compile_extra(func)
+
+    def define_pipelines(self) -> Any:
+        """Return the passes that kernels need."""
+        (passes,) = super().define_pipelines()
+        passes.passes = [one for one in passes.passes if one[0] not in UNUSED_PASSES]
+        return [passes]
+
+
+class KernelCompiler(LeanPipeline):
     """Compiler of kernels that Python calls."""
 
     def define_pipelines(self) -> Any:
@@ -77,7 +143,7 @@ class KernelCompiler(Compiler):
         return super().define_pipelines()
 
 
-class FunctionCompiler(Compiler):
+class FunctionCompiler(LeanPipeline):
     """Compiler of functions that kernels call."""
 
     library = FunctionLibrary

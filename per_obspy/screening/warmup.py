@@ -13,6 +13,7 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
+from per_obspy.kernels._linking import kept_garbage
 from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.relative import directional_relative_displacement
@@ -138,7 +139,8 @@ PARTS: dict[str, Callable[[], None]] = {
 
 def compile_part(name: str) -> str:
     """Compile one of `PARTS`, or everything that screening needs, and return its name."""
-    PARTS.get(name, compile_screening)()
+    with kept_garbage():
+        PARTS.get(name, compile_screening)()
     return name
 
 
