@@ -90,10 +90,6 @@ class KernelLibrary(JITCodeLibrary):
         # followed by one of each library that it calls.
         return list(dict.fromkeys(reversed(self._linking_libraries)))[::-1]
 
-    def _optimize_functions(self, module: Any) -> None:
-        """Leave the optimisation to the whole; only set the layout of data for it."""
-        module.data_layout = self._codegen._data_layout
-
 
 class FunctionLibrary(KernelLibrary):
     """Intermediate code of a function and of those that it calls, optimised."""
@@ -109,6 +105,10 @@ class FunctionLibrary(KernelLibrary):
 
 class LeanLibrary(FunctionLibrary):
     """Intermediate code of one function; the functions that it calls are listed, not linked."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Leave the optimisation to the kernel; only set the layout of data for it."""
+        module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
         """End the changes."""
