@@ -121,10 +121,12 @@ def test_the_docstring_of_the_package_lists_the_public_names():
     assert public_names.listing() in per_obspy.__doc__
 
 
-def test_ipython_completes_every_public_name():
+def test_ipython_completes_every_public_name(monkeypatch):
     from IPython.core.completer import IPCompleter, provisionalcompleter
     from IPython.core.interactiveshell import InteractiveShell
 
+    # it warns of an environment that is active but not that of the tests
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)
     shell = InteractiveShell.instance()
     try:
         shell.user_ns["per_obspy"] = per_obspy
