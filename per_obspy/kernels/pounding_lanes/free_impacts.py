@@ -246,7 +246,7 @@ def locate_impact(pair, row, left, right, next_left, next_right, share, segment)
     Return the time of the impact in a piece whose clearance closes once, and both states then.
 
     The time is a share of the step, as is the piece. It is corrected by the cubic of the clearance
-    at the last estimate until that is exact; it is -1 if this does not end.
+    at the last estimate until that is exact; it is -1 if this does not end, or leaves the step.
     """
     duration = segment.duration
     change = segment.slope * duration
@@ -266,6 +266,9 @@ def locate_impact(pair, row, left, right, next_left, next_right, share, segment)
         step -= step * step * bend * inverse
         last = -(value + step * (slope + step * (bend + step * twist))) * inverse
         step += last
+        # no impact of this piece is further away than a step
+        if not abs(step) <= 1.0:
+            break
         time += step
         # the cubic is exact over so short a step: states at the impact
         if (abs(step) <= CUBIC_SHARE) & (abs(last) <= LAST_SHARE):
