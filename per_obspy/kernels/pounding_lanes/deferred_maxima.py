@@ -57,15 +57,12 @@ class Record(NamedTuple):
     sizes : (2, n_groups) ndarray
         Integrals of the size of both components over groups of samples, m/s; see
         ``remaining_motion``.
-    steps : (2, n_steps + 1) ndarray
-        North and east acceleration at all steps, linear between the samples, m/s².
     """
 
     components: NDArray[np.float64]
     refinement: int
     duration: float
     sizes: NDArray[np.float64]
-    steps: NDArray[np.float64]
 
 
 @lean
@@ -75,12 +72,20 @@ def fill_ground(record, step, ground):
 
     Steps count the parts of all sampling intervals; after the record the ground rests.
     """
-    count = min(max(record.steps.shape[1] - step, 0), TILE_STEPS + 1)
-    for i in range(2):
-        for k in range(count):
-            ground[i, k] = record.steps[i, step + k]
-        for k in range(count, TILE_STEPS + 1):
-            ground[i, k] = 0.0
+    components = record.components
+    refinement = record.refinement
+    k = step // refinement
+    part = step % refinement
+    for column in range(TILE_STEPS + 1):
+        # linear between the samples k and k + 1
+        for i in range(2):
+            before = components[i, k] if k < components.shape[1] else 0.0
+            after = components[i, k + 1] if k + 1 < components.shape[1] else 0.0
+            ground[i, column] = before + (after - before) * (part / refinement)
+        part += 1
+        if part == refinement:
+            k += 1
+            part = 0
 
 
 @lean

@@ -132,17 +132,7 @@ def records_in_steps(components: FloatArray, parts: ArrayLike, dt: float) -> dic
     starts = np.arange(0, over_steps.shape[1], GROUP_SAMPLES)
     sizes = np.add.reduceat(over_steps, starts, axis=1) if starts.size else np.zeros((2, 0))
     numbers = np.unique(parts).tolist()
-    return {
-        number: Record(components, number, dt / number, sizes, at_steps(components, number))
-        for number in numbers
-    }
-
-
-def at_steps(components: FloatArray, parts: int) -> FloatArray:
-    """Return a record at the steps of which each sampling interval has so many, linear between."""
-    before, after = components[:, :-1, None], components[:, 1:, None]
-    inside = before + (after - before) * (np.arange(parts) / parts)
-    return np.concatenate([inside.reshape(2, -1), components[:, -1:]], axis=1)
+    return {number: Record(components, number, dt / number, sizes) for number in numbers}
 
 
 def pair_blocks(parts: NDArray[np.int64], rows: FloatArray) -> list[NDArray[np.int64]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 from per_obspy.kernels.pounding_events.motion import ROW_COLUMNS
 from per_obspy.kernels.pounding_lanes.lanes import PAIR_LANES
@@ -12,7 +12,6 @@ from per_obspy.pounding.history.pair_blocks import (
     CACHE_LINE,
     CHECKS,
     aligned,
-    at_steps,
     free_vibration_steps,
     pair_blocks,
     pair_fields,
@@ -95,15 +94,3 @@ def test_memory_begins_at_a_cache_line(size):
     assert memory.shape == (size,)
     assert memory.ctypes.data % CACHE_LINE == 0
     assert not memory.any()
-
-
-def test_steps_are_linear_between_the_samples():
-    # catches: components or parts exchanged, the last sample left out
-    record = np.random.default_rng(2).normal(size=(2, 5))
-    for parts in (1, 3):
-        found = at_steps(record, parts)
-        times = np.arange(4 * parts + 1) / parts
-        expected = [np.interp(times, np.arange(5), component) for component in record]
-        assert_allclose(found, expected, rtol=1e-14, atol=1e-15)  # rounding
-        assert_array_equal(found[:, ::parts], record)
-    assert_array_equal(at_steps(record[:, :1], 3), record[:, :1])
