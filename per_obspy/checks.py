@@ -28,7 +28,7 @@ def numbers(name: str, values: ArrayLike) -> FloatArray:
 
 
 def _require(name: str, array: FloatArray, good: NDArray[np.bool_], demand: str) -> FloatArray:
-    if not np.all(good):
+    if not good.all():
         index = np.unravel_index(int(np.argmin(good)), good.shape)
         place = f" at index {', '.join(map(str, index))}" if index else ""
         raise ValueError(f"{name} must be {demand}, got {array[index]}{place}")

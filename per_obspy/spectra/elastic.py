@@ -191,8 +191,8 @@ def grid_of(
         raise ValueError(
             f"damping must be a number or one row of numbers, got the shape {dampings.shape}"
         )
-    grid = np.broadcast_arrays(row, np.atleast_1d(dampings)[:, np.newaxis])
-    return (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
+    grid = np.tile(row, dampings.size), np.repeat(dampings, row.size)
+    return grid, (*dampings.shape, row.size)
 
 
 def _at_least_a_row(name: str, values: ArrayLike) -> FloatArray:
