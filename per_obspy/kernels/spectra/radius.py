@@ -33,9 +33,9 @@ LOCAL = STEP
 U, Z, SQUARE, A11, A12, A21, A22 = (row * LANES for row in range(DISPLACED))
 F0, F1, F2, F3, F4, F5, F6, F7, F8 = (row * LANES for row in range(DISPLACED, MOVED))
 G0, G1, G2, G3, G4, G5, G6, G7, G8 = (row * LANES for row in range(MOVED, STEP))
-#: Neighbouring oscillators whose tiles are run again together: two of the widest vectors, so that
-#: one is computed while the other waits for the step before.
-GROUP = 16
+#: Neighbouring oscillators whose tiles are run again together: one of the widest vectors. Of two
+#: vectors one is computed while the other waits for the step before, but more tiles are run again.
+GROUP = 8
 #: Rows by which tiles are ruled out: radius from which a tile is looked at, and what a unit of the
 #: sum of ``|a|`` takes from it, the phase of a step; bound of the radius; largest squared radius;
 #: twice the damping; growth of a radius backwards over a stride.
@@ -152,6 +152,10 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
         limits[5, lane] = math.exp(STRIDE * dampings[lane] * phases[lane])
     _fill_limits(strongest, phases, dampings, largest, 0, LANES, limits)
     for tile in range(peaks.size):
+        # Of most tiles no radius that was looked at comes close
+        if not _any_close(checkpoints, tile, pushes[tile], limits):
+            checkpoints[tile, 2, :] = 0.0
+            continue
         _mark_lanes(checkpoints, tile, peaks[tile], jumps[tile], pushes[tile], limits, marks)
         for first in range(0, LANES, GROUP):
             if not _any_marked(marks, first):
@@ -167,6 +171,16 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
                 checkpoints[tile, 2, first + k] = square
                 largest[0, first + k] = max(largest[0, first + k], square)
             _fill_limits(strongest, phases, dampings, largest, first, GROUP, limits)
+
+
+@kernel
+def _any_close(checkpoints, tile, push, limits):
+    """Return whether the radius of any lane of a tile comes close to its largest."""
+    count = 0
+    for lane in range(LANES):
+        least = max(limits[0, lane] - limits[1, lane] * push, 0.0)
+        count += checkpoints[tile, 2, lane] >= least * least
+    return count > 0
 
 
 @kernel
