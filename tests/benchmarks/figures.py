@@ -22,6 +22,7 @@ import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ FOLDER = Path(__file__).parent
 PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
 SCRIPTS = (
     *("start_up", "formats", "spectra", "stations", "pounding", "rows", "pair_estimates"),
-    *("footprints", "screening"),
+    *("histories", "footprints", "screening"),
 )
 
 #: File that takes one line per figure while the scripts run.
@@ -104,7 +105,9 @@ def choose_vectors() -> None:
     """Choose the width of vectors for a benchmark, before Numba is imported, and print it."""
     if Path(sys.argv[0]).resolve().parent == FOLDER.resolve():
         use_full_vectors()
-        print(machine(), flush=True)
+        # Not once more by each process that the benchmark starts
+        if parent_process() is None:
+            print(machine(), flush=True)
 
 
 def revision() -> str:
