@@ -12,7 +12,7 @@ import select
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 #: Exit codes after the interrupt key and after SIGTERM, as of programs that these signals end.
@@ -23,13 +23,15 @@ LIMIT = 5.0
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _request = threading.Event()
+_interrupts = list[Callable[[], None]]()
 
 
 class _Hold:
-    """Whether signals wait, and the one that does."""
+    """Whether signals wait, the one that does, and the last whose exception was raised."""
 
     depth = 0
     waiting: int | None = None
+    raised: int | None = None
 
 
 _hold = _Hold()
@@ -64,7 +66,7 @@ def ending_in_time() -> Iterator[None]:
         yield
         return
     _request.clear()
-    _hold.depth, _hold.waiting = 0, None
+    _hold.depth, _hold.waiting, _hold.raised = 0, None, None
     # The number of every signal is written at once, also while compiled code works
     read, write = os.pipe()
     os.set_blocking(write, False)
@@ -98,15 +100,55 @@ def held() -> Iterator[None]:
         _end(number)
 
 
+@contextmanager
+def interrupted_by_signals(interrupt: Callable[[], None]) -> Iterator[None]:
+    """
+    Call a function as soon as a signal ends the program, while the block lasts.
+
+    Parameters
+    ----------
+    interrupt : callable
+        Ends what other threads do for compiled code of the main thread, which looks for signals
+        but waits for these threads before it returns.
+    """
+    _interrupts.append(interrupt)
+    try:
+        yield
+    finally:
+        _interrupts.remove(interrupt)
+
+
+def raise_swallowed_end(error: BaseException) -> None:
+    """
+    Raise the exception of a signal again, if a library has made another error of it.
+
+    Parameters
+    ----------
+    error : BaseException
+        What the library has raised: databases look for signals while they work, and report their
+        exceptions as errors of the query.
+    """
+    if _hold.raised is None or not isinstance(error, Exception):
+        return
+    raise (KeyboardInterrupt if _hold.raised == signal.SIGINT else Terminated) from error
+
+
 def _end(number: int, *_: object) -> None:
     """Raise the exception of a signal; a second SIGTERM does not disturb the clearing up."""
     if _hold.depth:
         _hold.waiting = number
-    elif number == signal.SIGINT:
+        return
+    is_key = number == signal.SIGINT
+    if not is_key and _request.is_set():
+        return
+    _hold.raised = number
+    # Here, as the exception of a handler is noticed by what has not ended yet
+    for interrupt in _interrupts:
+        interrupt()
+    if is_key:
         raise KeyboardInterrupt
-    elif not _request.is_set():
-        _request.set()
-        raise Terminated
+    _request.set()
+    raise Terminated
 
 
 def _watch(read: int) -> None:

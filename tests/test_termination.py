@@ -60,6 +60,31 @@ with termination.ending_in_time():
 """
 
 
+#: A query that takes minutes, of the rows of a generator or of none.
+IN_DATABASE = """
+import sys, threading
+from pathlib import Path
+import numpy as np
+import pyarrow as pa
+from per_obspy import termination
+from per_obspy.tables.parts import batches, bounded_database
+def rows():
+    while True:
+        yield pa.record_batch([pa.array(np.arange(20_000))], names=["number"])
+query = "SELECT * FROM {} ORDER BY hash(number), hash(number + 1)"
+try:
+    with termination.ending_in_time(), bounded_database(Path(sys.argv[1])) as database:
+        threading.Timer(0.5, print, ["ready"], {"flush": True}).start()
+        if sys.argv[2] == "numbers":
+            database.execute("CREATE TABLE a AS " + query.format("range(500000000) AS a(number)"))
+        reader = pa.RecordBatchReader.from_batches(pa.schema([("number", pa.int64())]), rows())
+        database.register("numbers", reader)
+        next(batches(database, query.format("numbers"), 20_000))
+except KeyboardInterrupt:
+    sys.exit(termination.INTERRUPTED)
+"""
+
+
 def members(session):
     """Return the processes of a session, but for those that have ended and wait to be asked."""
     found = set()
@@ -93,6 +118,24 @@ def test_the_program_ends_where_no_exception_arrives(script, number):
     code, seconds, _ = end(running, number)
     assert code == 128 + number
     assert seconds < PROMISED
+
+
+@pytest.mark.parametrize("rows", ["numbers", "generator"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_query_of_the_database_ends_with_the_program(tmp_path, rows, number):
+    # Mutations: the error of the query instead of the end; its threads not interrupted
+    running = subprocess.Popen(
+        [sys.executable, "-c", IN_DATABASE, str(tmp_path), rows],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert running.stdout.readline() == "ready\n"
+    code, seconds, _ = end(running, number)
+    assert code == 128 + number
+    assert seconds < PROMISED
+    # an end by force would leave the rows that did not fit into memory
+    assert list(tmp_path.iterdir()) == []
 
 
 def terminated_twice():

@@ -22,7 +22,12 @@ from per_obspy.jobs.parallel import Work, new_and_resumed
 from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.tables.parts import joined_schema
-from per_obspy.tables.ranked.arranged_parts import CellRows, write_arranged, write_ranks
+from per_obspy.tables.ranked.arranged_parts import (
+    CellRows,
+    ranks_file,
+    write_arranged,
+    write_ranks,
+)
 from per_obspy.tables.ranked.cell_files import CellCounts, write_cell
 from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.ranked.ranked_table import ranked_table
@@ -31,6 +36,9 @@ from per_obspy.tables.table_files import write_columns
 
 #: Folder in the results in which the dataset is made, and the name of the dataset.
 WORK, DATASET = "cells", "risk"
+
+#: Form of the arranged files: those of another one are made again.
+FORM = "compressed batches, ranks in a file of their own"
 
 
 class ArrangeJob(NamedTuple):
@@ -129,7 +137,8 @@ def write_cells(
     # A folder of its own, which a killed run leaves to the next
     work, paths = folder / WORK, [part.path for part in parts if part.path]
     schema = joined_schema(paths)
-    key = content_hash({"facts": dict(facts), "size": size, "parts": _hashes(parts)})
+    known = {"facts": dict(facts), "size": size, "parts": _hashes(parts), "form": FORM}
+    key = content_hash(known)
     cells = _arranged(paths, work, schema, (key, size), means)
     whole = ranked_schema(schema, facts)
     made = _made(work / DATASET)
@@ -215,8 +224,9 @@ def _publish(work: Path, files: set[Path], target: Path) -> None:
 def _arrange(job: ArrangeJob) -> dict[str, CellRows]:
     """Arrange one part and write its status."""
     found = write_arranged(job.part, job.ranks, job.schema, job.size, job.file)
-    rows = {cell: [some.first, some.rows] for cell, some in found.items()}
-    outputs = {job.file.name: file_hash(job.file)}
+    # Place of the rows of each cell; the file is that of the job
+    rows = {cell: some[1:] for cell, some in found.items()}
+    outputs = {file.name: file_hash(file) for file in (job.file, ranks_file(job.file))}
     write_status(job.file.with_suffix(".json"), job.key, outputs, {"rows": rows})
     return found
 

@@ -25,6 +25,7 @@ from per_obspy.errors import MachineFault
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.ranking import KEYS
 from per_obspy.tables.table_files import as_arrow
+from per_obspy.termination import interrupted_by_signals, raise_swallowed_end
 
 #: Memory of the database for ordering.
 MEMORY = "1GB"
@@ -55,6 +56,8 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     ------
     MachineFault
         If the machine has less memory than the database needs.
+    Terminated, KeyboardInterrupt
+        If a signal ends the program: the query ends at once.
     """
     with temporary_folder(folder) as room:
         settings: dict[str, str | bool | int | float | list[str]] = {
@@ -66,9 +69,15 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
             # when there are two
             database.execute("SET disabled_optimizers = 'statistics_propagation'")
             try:
-                yield database
-            except duckdb.OutOfMemoryException as error:
-                raise MachineFault(f"{folder}: not enough memory to join the rows") from error
+                # Without this its threads go on with the query, which waits for them
+                with interrupted_by_signals(database.interrupt):
+                    yield database
+            except Exception as error:
+                raise_swallowed_end(error)
+                if isinstance(error, duckdb.OutOfMemoryException):
+                    reason = f"{folder}: not enough memory to join the rows"
+                    raise MachineFault(reason) from error
+                raise
 
 
 def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) -> Dataset:
@@ -187,9 +196,24 @@ def _merged(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.
 def parts_in_order(parts: Sequence[Path], size: int) -> Iterator[NDArray[np.int64]]:
     """Yield the number of the part of each row in the order of the whole, at most so many."""
     with bounded_database(parts[0].parent) as database:
-        database.register("parts", parquet_rows(parts, [_PART, *KEYS, "pair_id"]))
+        database.register("parts", _one_after_another(parts, [_PART, *KEYS, "pair_id"]))
         for batch in batches(database, _ORDER, size):
             yield np.asarray(batch[_PART], dtype=np.int64)
+
+
+def _one_after_another(parts: Sequence[Path], names: Sequence[str]) -> pa.RecordBatchReader:
+    """Return some columns of all parts, once; a dataset would read many parts ahead."""
+    schema = pq.read_schema(parts[0].absolute())
+    some = pa.schema([schema.field(name) for name in names])
+    rows = (batch for part in parts for batch in _columns(part, some))
+    return pa.RecordBatchReader.from_batches(some, rows)
+
+
+def _columns(part: Path, schema: pa.Schema) -> Iterator[pa.RecordBatch]:
+    """Yield some columns of a part, some thousands of rows at a time."""
+    with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
+        for batch in file.iter_batches(TOGETHER, columns=schema.names, use_threads=False):
+            yield pa.RecordBatch.from_arrays([batch[name] for name in schema.names], schema=schema)
 
 
 def next_rows(rows: dict[int, "WaitingRows"], order: NDArray[np.int64]) -> pa.Table:

@@ -22,7 +22,7 @@ from per_obspy.progress import silent
 from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables.parts import write_part
-from per_obspy.tables.ranked import cell_files
+from per_obspy.tables.ranked import arranged_parts, cell_files
 from per_obspy.tables.risk import write_risk
 
 COUNT = 120
@@ -129,10 +129,55 @@ def test_nothing_is_written_elsewhere(expected):
 @pytest.mark.parametrize(("size", "most"), [(2, 4), (7, 64)])
 def test_bytes_do_not_depend_on_chunks(rows, expected, tmp_path, monkeypatch, size, most):
     # 60 parts of two rows are merged in several passes
-    monkeypatch.setattr(cell_files, "MOST_PARTS", most)
+    monkeypatch.setattr(cell_files, "MOST_FILES", most)
     written(parts_of(rows.sample(frac=1.0, random_state=size), tmp_path, size), tmp_path)
     assert contents(tmp_path) == contents(expected)
     assert not (tmp_path / "cells").exists()
+
+
+@pytest.mark.parametrize(("batch", "together"), [(1, 5), (3, 50), (3, 10_000)])
+def test_bytes_do_not_depend_on_what_is_read_together(
+    rows, expected, tmp_path, monkeypatch, batch, together
+):
+    # Mutations: batches of a cell counted from its rows rounded down; ranks of a window taken
+    # again in the next; the last window left out.
+    for module in (arranged_parts, cell_files):
+        monkeypatch.setattr(module, "BATCH", batch)
+    monkeypatch.setattr(cell_files, "TOGETHER", together)
+    monkeypatch.setattr(cell_files, "ROWS", 8)
+    monkeypatch.setattr(cell_files, "MOST_FILES", 3)
+    written(parts_of(rows, tmp_path, 10), tmp_path)
+    # groups of rows have another size, so the values are compared
+    for name in contents(expected):
+        found, known = (pq.read_table(folder / "risk" / name) for folder in (tmp_path, expected))
+        assert found.equals(known, check_metadata=True)
+
+
+def test_many_parts_are_merged_in_one_pass_with_one_batch_of_each(
+    rows, expected, tmp_path, monkeypatch
+):
+    # would catch a second copy of the cells on the disk, and files that are read as a whole
+    monkeypatch.setattr(arranged_parts, "BATCH", 1)
+    read, ahead = [0], []
+
+    def counted(one, batches=arranged_parts.arranged_rows):
+        for batch in batches(one):
+            read[0] += batch.num_rows
+            yield batch
+
+    def merged(waiting, order, next_rows=cell_files.next_rows):
+        taken = next_rows(waiting, order)
+        read[0] -= taken.num_rows
+        ahead.append(read[0])
+        return taken
+
+    monkeypatch.setattr(cell_files, "arranged_rows", counted)
+    monkeypatch.setattr(cell_files, "next_rows", merged)
+    monkeypatch.setattr(cell_files, "_merged", None)
+    written(parts_of(rows, tmp_path, 1), tmp_path)
+    assert contents(tmp_path) == contents(expected)
+    # no row but those that are wanted
+    assert set(ahead) == {0}
 
 
 def test_bytes_do_not_depend_on_workers(rows, expected, tmp_path):
@@ -156,6 +201,18 @@ def test_a_run_that_is_killed_between_cells_is_resumed(rows, expected, tmp_path,
         assert total - again.left == total - tasks
         assert contents(tmp_path) == contents(expected)
         shutil.rmtree(tmp_path / "risk")
+
+
+@pytest.mark.parametrize("name", ["000001.arrow", "000001.ranks"])
+def test_an_arranged_part_that_is_cut_is_made_again(rows, expected, tmp_path, name):
+    # Mutation: the hash of one file only
+    parts = parts_of(rows, tmp_path, 40)
+    with pytest.raises(Stopped):
+        written(parts, tmp_path, Limited(len(parts)))
+    file = tmp_path / "cells" / "arranged" / name
+    file.write_bytes(file.read_bytes()[:-8])
+    written(parts, tmp_path)
+    assert contents(tmp_path) == contents(expected)
 
 
 def test_cells_of_other_parts_are_not_taken(rows, expected, tmp_path):
