@@ -101,6 +101,22 @@ class TestAgainstSingleHistories:
             checked += 1
         assert checked > 5
 
+    def test_pairs_with_gaps_one_by_one(self):
+        # catches: an early end of a history that still changes it, an impact counted otherwise
+        acceleration, fields, count = shaking(), self.linear_pairs(40), 0
+        fields["gap"] = np.random.default_rng(4).uniform(0.005, 0.08, 40)
+        maxima = pounding_histories(acceleration, DT, **fields)
+        for i in range(40):
+            history = single(acceleration, fields, i)
+            assert maxima.impacts[i] == history.impacts["counted"].sum()
+            # both exact: rounding, which grows with the impacts, of which there are up to 250
+            assert_allclose(maxima.per[:, i], history.per, rtol=1e-12)
+            assert_allclose(
+                maxima.displacement_maxima[:, i], history.displacement_maxima, rtol=1e-12
+            )
+            count += len(history.impacts)
+        assert count > 400
+
     @staticmethod
     def linear_pairs(count):
         """Return pairs of linear structures of one gap and restitution."""
