@@ -33,7 +33,7 @@ from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.ranked.ranked_table import RankedTable, ranked_table
 from per_obspy.tables.totals import (
-    PieceTotals,
+    CountedTotals,
     RegionTotals,
     piece_totals,
     region_totals,
@@ -87,7 +87,7 @@ class _Pieces(NamedTuple):
     first_named: list[int]
     shown: list[pd.DataFrame]
     observed: list[pd.DataFrame]
-    totals: list[PieceTotals]
+    totals: CountedTotals
     notes: Notes
 
 
@@ -195,7 +195,7 @@ def _summary(
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else _needed_columns(settings)
     # The layer takes the pieces one by one, and so they are noted on the way
-    pieces = _Pieces([], [], [], [], [], Notes(list(settings.screening.classes)))
+    pieces = _Pieces([], [], [], [], CountedTotals(), Notes(list(settings.screening.classes)))
     with ranked_table(risk, columns) as table:
         listed = worst_pairs(table, settings)
         noted = _noted(table, settings, pieces)

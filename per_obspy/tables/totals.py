@@ -1,6 +1,6 @@
 """Totals of a region by area, from a risk table that is read in pieces."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -16,11 +16,15 @@ from per_obspy.screening.region.outlines import box_outlines, hexagon_outlines, 
 from per_obspy.screening.region.totals import (
     PartialTotals,
     grid_cells,
+    joined_parts,
     joined_totals,
     partial_totals,
 )
 from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv
+
+#: Pieces that are joined together.
+TOGETHER = 16
 
 #: Columns of the risk table that totals need.
 COLUMNS = (
@@ -66,6 +70,31 @@ class PieceTotals(NamedTuple):
 
     totals: PartialTotals
     boxes: Mapping[str, FloatArray] = MappingProxyType({})
+
+
+class CountedTotals:
+    """Totals of pieces of a risk table that are counted one after the other."""
+
+    def __init__(self) -> None:
+        self._waiting = list[PieceTotals]()
+
+    def append(self, piece: PieceTotals) -> None:
+        """Count a piece; several that wait become one, so that memory is that of the areas."""
+        self._waiting.append(piece)
+        if len(self._waiting) >= TOGETHER:
+            self._waiting = [_joined(self._waiting)]
+
+    def __iter__(self) -> Iterator[PieceTotals]:
+        """Yield the totals of all pieces."""
+        yield from self._waiting
+
+
+def _joined(pieces: Sequence[PieceTotals]) -> PieceTotals:
+    """Return the totals of several pieces as those of one."""
+    boxes: dict[str, FloatArray] = {}
+    for piece in pieces:
+        boxes |= piece.boxes
+    return PieceTotals(joined_parts(piece.totals for piece in pieces), boxes)
 
 
 def totals_columns(settings: Totals) -> list[str]:
@@ -166,17 +195,13 @@ def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTota
     settings : Totals
         The same as of the pieces.
     """
-    counted = list(pieces)
-    table = joined_totals([piece.totals for piece in counted])
+    counted = _joined(list(pieces))
+    table = joined_totals([counted.totals])
     if settings.area:
         return RegionTotals(table, None)
     if settings.h3 is not None:
         return RegionTotals(table, hexagon_outlines(table["area"]))
-    # Outlines of all cells that a piece has
-    boxes: dict[str, FloatArray] = {}
-    for piece in counted:
-        boxes |= piece.boxes
-    return RegionTotals(table, [boxes[name] for name in table["area"]])
+    return RegionTotals(table, [counted.boxes[name] for name in table["area"]])
 
 
 def write_totals(table: pd.DataFrame, path: Path) -> None:

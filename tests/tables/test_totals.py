@@ -6,8 +6,10 @@ import pytest
 import shapely
 
 from per_obspy.config import Totals
+from per_obspy.tables import totals as tables
 from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.totals import (
+    CountedTotals,
     piece_totals,
     region_totals,
     totals_columns,
@@ -55,6 +57,23 @@ def test_pieces_do_not_change_totals(risk, kind):
     assert (pieces.outlines is None) == (whole.outlines is None)
     for first, second in zip(pieces.outlines or (), whole.outlines or (), strict=True):
         np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pieces_that_are_joined_on_the_way_do_not_change_totals(risk, kind, monkeypatch):
+    # Mutations: the joined piece without its boxes; pairs of probability 1 counted once per area;
+    # the worst pair of the last pieces instead of all.
+    monkeypatch.setattr(tables, "TOGETHER", 3)
+    some = risk.assign(probability=risk["probability"].round(0).where(risk["rank"] % 3 > 0, 0.4))
+    settings = Totals(**kind)
+    table, found = some[totals_columns(settings)], CountedTotals()
+    for first in range(COUNT - 12, -1, -12):  # the worst pairs come last
+        found.append(piece_totals(table.iloc[first : first + 12], settings, CLASSES))
+    assert len(list(found)) <= 3
+    joined, whole = region_totals(found, settings), totals(some, kind, COUNT)
+    pd.testing.assert_frame_equal(joined.table, whole.table, rtol=1e-12)  # sums in another order
+    # the expected number is the sum of all probabilities, with zeros and ones
+    assert joined.table["expected_pounding"].sum() == pytest.approx(some["probability"].sum())
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -26,7 +26,7 @@ from per_obspy.screening.ranking import pounding_state, risk_class
 from per_obspy.screening.region.ensemble import ensemble_columns
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.tables.totals import (
-    PieceTotals,
+    CountedTotals,
     areas_of,
     piece_totals,
     region_totals,
@@ -87,7 +87,7 @@ class _Noted(NamedTuple):
     notes: Notes
     shown: list[pd.DataFrame]
     worst: list[pd.DataFrame]
-    totals: list[PieceTotals]
+    totals: CountedTotals
 
 
 def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report:
@@ -208,7 +208,7 @@ def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFram
 
 def _write(asked: _Asked, pieces: Iterator[pd.DataFrame], pairs: int, report: Report) -> None:
     """Read a table once, and write page, summary, totals, layers and workbook."""
-    found = _Noted(Notes(asked.region.classes), [], [], [])
+    found = _Noted(Notes(asked.region.classes), [], [], CountedTotals())
     noted = _noted(pieces, pairs, asked, found)
     if asked.settings.geopackage:
         files = layer_paths(asked.folder, asked.stem)

@@ -1,37 +1,33 @@
 """
 Numbers of the buildings of all pairs, and pieces of pairs that share no building with others.
 
-Only whole numbers of all pairs are in memory: identifiers are sorted and looked up by a database of
-bounded memory.
+Only whole numbers of all pairs are in memory: identifiers are sorted by a database of bounded
+memory.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import duckdb
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.inventory.building_rows.contacts import IntArray, identifiers_of
-from per_obspy.pipeline.rows.pair_columns import TOGETHER, PairColumns
+from per_obspy.pipeline.rows.pair_columns import PairColumns
 from per_obspy.tables.parts import batches
 
 #: Columns of the pair table without which no pair names its buildings.
 IDENTIFIERS = ("building_id_1", "building_id_2")
 
-_TEXTS = pa.schema([("place", pa.int64()), *((name, pa.string()) for name in IDENTIFIERS)])
+#: Sorted identifiers that are numbered together.
+SORTED = 100_000
 
-#: Identifiers with their place in alphabetical order; cells without one are empty texts.
-_NAMES = (
-    "CREATE TABLE names AS SELECT name, row_number() OVER (ORDER BY name) - 1 AS number FROM ("
-    "SELECT building_id_1 AS name FROM ends UNION SELECT building_id_2 FROM ends) WHERE name <> ''"
-)
-_NUMBERS = (
-    "SELECT coalesce(first.number, -1), coalesce(second.number, -1) FROM ends "
-    "LEFT JOIN names AS first ON building_id_1 = first.name "
-    "LEFT JOIN names AS second ON building_id_2 = second.name ORDER BY place"
-)
+#: Identifier of one building of a pair, and its place: 2 · pair, + 1 at building 2.
+_ENDS = pa.schema([("place", pa.int64()), ("name", pa.string())])
+
+_SORTED = "SELECT place, name FROM ends ORDER BY name"
 
 
 class BuildingNumbers(NamedTuple):
@@ -64,32 +60,41 @@ def building_numbers(pairs: PairColumns, database: duckdb.DuckDBPyConnection) ->
     codes = np.full((pairs.pairs, 2), -1, dtype=np.int32)
     if not set(IDENTIFIERS) & set(pairs.names):
         return BuildingNumbers(codes, 0)
-    # Identifiers are sorted once, and looked up for both sides
-    texts = pa.RecordBatchReader.from_batches(_TEXTS, _texts(pairs))
-    database.register("texts", texts)
-    database.execute("CREATE TABLE ends AS SELECT * FROM texts")
-    database.unregister("texts")
-    database.execute(_NAMES)
-    # In the order of the pairs
-    before = 0
-    for batch in batches(database, _NUMBERS, TOGETHER):
-        place = slice(before, before + batch.num_rows)
-        codes[place, 0], codes[place, 1] = batch[0], batch[1]
-        before += batch.num_rows
-    (counted,) = database.sql("SELECT count(*) FROM names").fetchall()
-    for name in ("names", "ends"):
-        database.execute(f"DROP TABLE {name}")
-    return BuildingNumbers(codes, int(counted[0]))
+    # In the order of the names
+    ends, named = codes.reshape(-1), 0
+    database.register("ends", pa.RecordBatchReader.from_batches(_ENDS, _ends(pairs)))
+    for place, number in _numbered(batches(database, _SORTED, SORTED)):
+        ends[place] = number
+        named = int(number[-1]) + 1
+    database.unregister("ends")
+    return BuildingNumbers(codes, named)
 
 
-def _texts(pairs: PairColumns) -> Iterator[pa.RecordBatch]:
-    """Yield the place of each pair and its two identifiers, empty texts without one."""
+def _numbered(ends: Iterable[pa.RecordBatch]) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield places and numbers of sorted identifiers: every new one has the next number."""
+    number, last = -1, ""
+    for batch in ends:
+        names = batch["name"]
+        is_new = np.empty(batch.num_rows, dtype=bool)
+        # The first may be the last of the batch before
+        is_new[0] = names[0].as_py() != last
+        is_new[1:] = pc.not_equal(names[1:], names[:-1]).to_numpy(zero_copy_only=False)
+        numbers = number + np.cumsum(is_new)
+        yield batch["place"].to_numpy(), numbers
+        number, last = int(numbers[-1]), names[-1].as_py()
+
+
+def _ends(pairs: PairColumns) -> Iterator[pa.RecordBatch]:
+    """Yield place and identifier of the buildings that have one."""
     before = 0
     for batch in pairs.batches(IDENTIFIERS):
         frame = batch.to_pandas()
-        sides = [pa.array(identifiers_of(frame, name), pa.string()) for name in IDENTIFIERS]
-        place = pa.array(np.arange(before, before + batch.num_rows))
-        yield pa.RecordBatch.from_arrays([place, *sides], schema=_TEXTS)
+        # Both buildings of a pair
+        for side, name in enumerate(IDENTIFIERS):
+            texts = pa.array(identifiers_of(frame, name), pa.string())
+            place = pa.array(2 * np.arange(before, before + batch.num_rows) + side)
+            ends = pa.RecordBatch.from_arrays([place, texts], schema=_ENDS)
+            yield ends.filter(pc.not_equal(texts, ""))
         before += batch.num_rows
 
 

@@ -1,6 +1,7 @@
 """Totals of a risk table by administrative area or by cell of a grid."""
 
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,9 @@ from per_obspy.screening.ranking import EVERY_STATE
 
 #: Numbers of cells per row: more than any row has, so that row and column make one number.
 ROW_FACTOR = 1 << 32
+
+#: Column of the number of pairs whose probability is 1, which are half of a usual table.
+CERTAIN = "certain"
 
 #: Unit and meaning of the columns of a table of totals; each risk class adds a column
 #: ``class_...``.
@@ -189,13 +193,14 @@ class PartialTotals(NamedTuple):
         Numbers of pairs, and sums of their positions on the unit sphere, by area.
     worst : DataFrame
         The worst pair of each area with its ``rank``.
-    probability : DataFrame or None
-        Area and probability of each pair; 12 bytes per pair.
+    probabilities : tuple of DataFrame
+        Area and probability of each pair whose probability is neither 0 nor 1, at most 12 bytes
+        per pair; pairs of probability 1 are counted in the sums.
     """
 
     sums: pd.DataFrame
     worst: pd.DataFrame
-    probability: pd.DataFrame | None
+    probabilities: tuple[pd.DataFrame, ...]
 
 
 def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str]) -> PartialTotals:
@@ -229,8 +234,12 @@ def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str])
     added["x"] = np.cos(north) * np.cos(east)
     added["y"] = np.cos(north) * np.sin(east)
     added["z"] = np.sin(north)
+    probabilities = tuple[pd.DataFrame, ...]()
+    if "probability" in rows:
+        added[CERTAIN] = rows["probability"] == 1.0
+        probabilities = (_probabilities(rows),)
     sums = pd.DataFrame(added).groupby(rows["area"]).sum()
-    return PartialTotals(sums, _worst_pairs(rows), _probabilities(rows))
+    return PartialTotals(sums, _worst_pairs(rows), probabilities)
 
 
 def _worst_pairs(rows: pd.DataFrame) -> pd.DataFrame:
@@ -239,12 +248,20 @@ def _worst_pairs(rows: pd.DataFrame) -> pd.DataFrame:
     return worst[["area", "rank", "pair_id", "state", "expected_impact_velocity"]]
 
 
-def _probabilities(rows: pd.DataFrame) -> pd.DataFrame | None:
-    """Return area and probability of the pairs that have one, if the table has the column."""
-    if "probability" not in rows:
-        return None
+def _probabilities(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return area and probability of the pairs whose probability is neither 0 nor 1."""
+    between = rows["probability"].between(0.0, 1.0, inclusive="neither")
     # A copy: a view would keep all columns of the piece in memory
-    return rows[["area", "probability"]].dropna().astype({"area": "category"}).copy()
+    kept = rows.loc[between, ["area", "probability"]]
+    return kept.astype({"area": "category"}).copy()
+
+
+def joined_parts(parts: Iterable[PartialTotals]) -> PartialTotals:
+    """Return the contributions of some pieces, at least one, as that of one piece."""
+    sums, worst, probabilities = zip(*parts, strict=True)
+    counted = pd.concat(sums).fillna(0.0).groupby(level=0, sort=True).sum()
+    first = pd.concat(worst).sort_values("rank").drop_duplicates("area")
+    return PartialTotals(counted, first, tuple(chain.from_iterable(probabilities)))
 
 
 def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
@@ -261,16 +278,16 @@ def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
     DataFrame
         See :func:`totals`.
     """
-    sums, worst, probabilities = zip(*parts, strict=True)
-    counted = pd.concat(sums).fillna(0.0).groupby(level=0, sort=True).sum()
+    whole = joined_parts(parts)
+    counted = whole.sums
     x, y, z = (counted.pop(name) for name in "xyz")
     counted = counted.astype(np.int64)
 
     # Areas without any probability expect no pounding pair
-    known = [piece for piece in probabilities if piece is not None]
-    if known:
-        counted = counted.join(_expected(known)).fillna(dict.fromkeys(EXPECTED, 0.0))
-    counted = counted.join(_worst_of(worst))
+    if whole.probabilities:
+        expected = _expected(whole.probabilities, counted.pop(CERTAIN))
+        counted = counted.join(expected).fillna(dict.fromkeys(EXPECTED, 0.0))
+    counted = counted.join(_worst_of(whole.worst))
 
     # The middle is the mean direction, which holds across the date line too
     latitude = np.degrees(np.arctan2(z, np.hypot(x, y)))
@@ -281,21 +298,26 @@ def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
 EXPECTED = tuple(f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common"))
 
 
-def _worst_of(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Return the worst pair of each area from those of all pieces."""
-    first = pd.concat(pieces).sort_values("rank").drop_duplicates("area")
-    named = first.set_index("area").drop(columns="rank")
+def _worst_of(worst: pd.DataFrame) -> pd.DataFrame:
+    """Return the worst pair of each area with the names of its columns in the totals."""
+    named = worst.set_index("area").drop(columns="rank")
     return named.add_prefix("worst_").rename(columns={"worst_pair_id": "worst_pair"})
 
 
-def _expected(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Return the expected number of pounding pairs of every area that has a probability."""
+def _expected(pieces: Sequence[pd.DataFrame], certain: "pd.Series[int]") -> pd.DataFrame:
+    """Return the expected number of pounding pairs of every area that may have one."""
     # Pieces have different categories of areas
     area = union_categoricals([piece["area"] for piece in pieces])
     probability = np.concatenate([piece["probability"] for piece in pieces])
-    table = pd.DataFrame({"area": area, "probability": probability})
-    groups = table.groupby("area", observed=True)["probability"]
-    counts = {name: expected_count(values) for name, values in groups}
+    # Pairs of an area one after the other; of each area only its own are copied
+    order = np.argsort(area.codes, kind="stable")
+    ends = np.cumsum(np.bincount(area.codes, minlength=area.categories.size))
+    counts = {}
+    for name, code in zip(certain.index, area.categories.get_indexer(certain.index), strict=True):
+        some = order[ends[code - 1] if code > 0 else 0 : ends[code]] if code >= 0 else order[:0]
+        values = np.concatenate([np.ones(certain[name]), probability[some]])
+        if values.size:
+            counts[name] = expected_count(values)
     return pd.DataFrame(counts, index=list(EXPECTED)).T
 
 

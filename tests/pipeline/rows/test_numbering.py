@@ -6,6 +6,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from per_obspy.pipeline.rows import numbering
+from per_obspy.pipeline.rows import pair_columns as pair_columns_module
 from per_obspy.pipeline.rows.numbering import BuildingNumbers, building_numbers, piece_numbers
 from per_obspy.pipeline.rows.pair_columns import pair_columns
 from per_obspy.tables.buildings import small_database
@@ -35,6 +37,21 @@ def test_numbers_follow_the_alphabet_of_the_bytes(numbered):
         [place[a], place[b]] for a, b in zip(first, second, strict=True)
     ]
     assert found.named == len(names)
+
+
+@pytest.mark.parametrize("together", [1, 3, 1000])
+def test_equal_identifiers_have_one_number_wherever_they_are_read(numbered, monkeypatch, together):
+    # Mutations: a new number at the begin of each batch; none where a batch begins with another
+    # name than the one before ends with
+    monkeypatch.setattr(numbering, "SORTED", together)
+    monkeypatch.setattr(pair_columns_module, "TOGETHER", 7)
+    draw = np.random.default_rng(6)
+    sides = draw.choice([*"abcdefgh", ""], (2, 50))
+    found = numbered(building_id_1=sides[0].tolist(), building_id_2=sides[1].tolist())
+    names = np.unique(sides[sides != ""])
+    expected = np.where(sides == "", -1, np.searchsorted(names, sides))
+    assert found.codes.T.tolist() == expected.tolist()
+    assert found.named == names.size
 
 
 def test_a_table_without_identifiers_has_no_numbers(numbered):
