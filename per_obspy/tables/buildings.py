@@ -46,8 +46,7 @@ ROWS = 50_000
 #: Name of the column of areas in the file of contacts: that of the pair table may be any.
 AREA = "area_of_totals"
 
-#: Memory of the database, and its threads: one needs a quarter less processor time than two.
-MEMORY = "256MB"
+#: Threads of the database: one needs a quarter less processor time than two.
 THREADS = 1
 
 _NUMBER = Column("building_number", "int64", "1", "")
@@ -92,10 +91,9 @@ class BuildingWays(NamedTuple):
 
 
 @contextmanager
-def small_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Yield a database of little memory, which leaves the rest to a temporary folder inside."""
+def one_thread_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Yield a database of one thread, which leaves what is too much to a folder inside."""
     with bounded_database(folder) as database:
-        database.execute(f"SET memory_limit = '{MEMORY}'")
         database.execute(f"SET threads = {THREADS}")
         yield database
 
@@ -130,7 +128,7 @@ def write_buildings(
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
-    with temporary_folder(folder) as room, small_database(room) as database:
+    with temporary_folder(folder) as room, one_thread_database(room) as database:
         # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:

@@ -74,10 +74,16 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
                     yield database
             except Exception as error:
                 raise_swallowed_end(error)
-                if isinstance(error, duckdb.OutOfMemoryException):
+                if _is_out_of_memory(error):
                     reason = f"{folder}: not enough memory to join the rows"
                     raise MachineFault(reason) from error
                 raise
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    """Return whether a database had too little memory; its streams report all as OSError."""
+    by_stream = isinstance(error, OSError) and "Out of Memory Error" in str(error)
+    return by_stream or isinstance(error, duckdb.OutOfMemoryException)
 
 
 def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) -> Dataset:

@@ -11,7 +11,13 @@ import pytest
 from per_obspy.errors import MachineFault
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables import parts
-from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, write_part
+from per_obspy.tables.parts import (
+    batches,
+    bounded_database,
+    joined_rows,
+    joined_schema,
+    write_part,
+)
 
 
 def table(count, seed, first=0):
@@ -148,7 +154,8 @@ def test_columns_of_the_order_are_left_out(tmp_path):
     assert "order_part" in pq.read_schema(paths[0]).names
 
 
-def test_a_database_without_memory_is_a_fault_of_the_machine(tmp_path):
+@pytest.mark.parametrize("by_stream", [False, True])
+def test_a_database_without_memory_is_a_fault_of_the_machine(tmp_path, by_stream):
     # 80 MB of numbers in the order of another column do not fit into 10 MB without a folder
     query = "SELECT * FROM range(10000000) AS rows(number) ORDER BY hash(number)"
 
@@ -156,6 +163,8 @@ def test_a_database_without_memory_is_a_fault_of_the_machine(tmp_path):
         with bounded_database(tmp_path) as database:
             database.execute("SET memory_limit = '10MB'")
             database.execute("SET max_temp_directory_size = '0KB'")
+            if by_stream:
+                list(batches(database, query, 1000))
             database.execute(query).fetchall()
 
     with pytest.raises(MachineFault, match="not enough memory"):

@@ -26,7 +26,7 @@ from per_obspy.screening.building_rows.members import NEEDED
 from per_obspy.screening.building_rows.placed import ChunkNumbers
 from per_obspy.screening.building_rows.sides import OF_PAIRS
 from per_obspy.tables.building_rows import TOGETHER as GROUP
-from per_obspy.tables.buildings import AREA, small_database, stored_rows
+from per_obspy.tables.buildings import AREA, one_thread_database, stored_rows
 from per_obspy.tables.described import regrouped
 from per_obspy.tables.parts import batches
 
@@ -93,7 +93,7 @@ def all_rows(pairs: PairColumns, rows: Rows, area: str | None, room: Path) -> Al
     # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
     noted = _Noted([], [], [], Counter())
     found, ordered = room / "found.parquet", room / "contacts.parquet"
-    with small_database(room) as database:
+    with one_thread_database(room) as database:
         numbers = building_numbers(pairs, database)
         piece = piece_numbers(numbers, PIECE)
         columns = _columns(area)
@@ -110,7 +110,7 @@ def all_rows(pairs: PairColumns, rows: Rows, area: str | None, room: Path) -> Al
 
 def _write_ordered(found: Path, named: int, ends: IntArray, path: Path) -> int:
     """Write contacts in their order of computation, and return their number."""
-    with small_database(path.parent) as database, stored_rows(found) as stored:
+    with one_thread_database(path.parent) as database, stored_rows(found) as stored:
         database.register("found", stored)
         count = _write(_completed(batches(database, _ORDER, PIECE), named, ends), path)
     found.unlink()

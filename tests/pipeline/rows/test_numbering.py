@@ -10,7 +10,7 @@ from per_obspy.pipeline.rows import numbering
 from per_obspy.pipeline.rows import pair_columns as pair_columns_module
 from per_obspy.pipeline.rows.numbering import BuildingNumbers, building_numbers, piece_numbers
 from per_obspy.pipeline.rows.pair_columns import pair_columns
-from per_obspy.tables.buildings import small_database
+from per_obspy.tables.buildings import one_thread_database
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def numbered(tmp_path):
     def number(**columns):
         path = tmp_path / "risk.parquet"
         pq.write_table(pa.table(columns), path)
-        with pair_columns([path]) as pairs, small_database(tmp_path) as database:
+        with pair_columns([path]) as pairs, one_thread_database(tmp_path) as database:
             return building_numbers(pairs, database)
 
     return number
