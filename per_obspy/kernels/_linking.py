@@ -10,20 +10,20 @@ Scalar functions are not even optimised before that. Those with loops over array
 become vectors before they are merged into their callers, without which spectra take some percent
 longer.
 
-Half of the time goes into Numba's own Python code. Three things shorten it: no search for garbage
-meanwhile, options that compare quickly, and no passes for what kernels do not contain.
+Half of the time goes into Numba's own Python code, which :mod:`per_obspy.kernels._quick` shortens,
+besides leaving out passes for what kernels do not contain.
 """
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from numba.core import event, sigutils, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, Flags
+from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.types import unliteral
+
+from per_obspy.kernels._quick import KnownCalls, QuickFlags, kept_garbage, short_error
 
 #: Passes for closures, comprehensions, ``with``, and loops over tuples of several types.
 UNUSED_PASSES = {
@@ -36,38 +36,6 @@ UNUSED_PASSES = {
     untyped_passes.LiteralUnroll,
     untyped_passes.LiteralPropagationSubPipelinePass,
 }
-
-#: Value of every compiler option that is not set.
-DEFAULTS = {name: option.default for name, option in Flags.options.items()}
-
-
-class QuickFlags(Flags):
-    """Compiler options of one function, which Numba compares with others some 100 000 times."""
-
-    __slots__ = ()
-
-    def __hash__(self) -> int:
-        """Return what Numba returns: it is the same for all options."""
-        return OPTIONS_HASH
-
-    def values(self) -> dict[str, Any]:
-        """Return the values by name, without a call for each."""
-        return DEFAULTS | self._values
-
-
-OPTIONS_HASH = hash(Flags())
-
-
-@contextmanager
-def kept_garbage() -> Iterator[None]:
-    """Search for no garbage in cycles: compilation makes many objects and few cycles."""
-    is_searched = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if is_searched:
-            gc.enable()
 
 
 class KernelLibrary(JITCodeLibrary):
@@ -121,7 +89,8 @@ class LeanPipeline(Compiler):
     def compile_extra(self, func: Any) -> Any:
         """Compile a function of Python, with options that compare quickly."""
         self.state.flags = QuickFlags(self.state.flags)
-        with kept_garbage():
+        self.state.typingctx = KnownCalls(self.state.typingctx)
+        with kept_garbage(), short_error():
             return super().compile_extra(func)
 
     def define_pipelines(self) -> Any:
@@ -185,10 +154,19 @@ class LinkedFunction(CPUDispatcher):
         super().__init__(kernel.py_func, **options)
         self.kernel = kernel
         self._cache = kernel._cache
+        self._is_optimised_alone = compiler.library is FunctionLibrary
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the kernel."""
         return self.kernel(*arguments, **named)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return what the typing of a call needs; one code serves all constants of a type."""
+        # Merged into its caller before it is optimised, the code knows the constants of the call
+        if not self._is_optimised_alone:
+            args = tuple(map(unliteral, args))
+            kws = {name: unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(args, kws)
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, once; return the key by which a call finds the code."""

@@ -4,6 +4,7 @@ Compilation of kernels ahead of use: of all in parts, or of screening during a r
 The parts share few kernels, so that processes can compile them next to each other.
 """
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Thread
@@ -13,7 +14,7 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.kernels._linking import kept_garbage
+from per_obspy.kernels._quick import kept_garbage
 from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.relative import directional_relative_displacement
@@ -141,6 +142,8 @@ def compile_part(name: str) -> str:
     """Compile one of `PARTS`, or everything that screening needs, and return its name."""
     with kept_garbage():
         PARTS.get(name, compile_screening)()
+        # A search through what is left of it takes more than a second, and frees what is not missed
+        gc.freeze()
     return name
 
 
