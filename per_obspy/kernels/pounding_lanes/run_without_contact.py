@@ -20,7 +20,8 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     search_deferred,
     write_lane,
 )
-from per_obspy.kernels.pounding_lanes.free_impacts import opening_rate, set_states
+from per_obspy.kernels.pounding_lanes.free_impacts import opening_rate
+from per_obspy.kernels.pounding_lanes.impact_steps import set_states
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
     DISPLACEMENT_ERROR,

@@ -2,7 +2,7 @@
 Scalar steps of one pair through a tile that may hold an event.
 
 Steps that certainly hold no event use the same formulas as ``lanes``; the others are repeated:
-single impacts by ``free_impacts``, and all else from event to event, by the code of single
+single impacts by ``impact_steps``, and all else from event to event, by the code of single
 histories (``next_event``).
 """
 
@@ -26,7 +26,7 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     search_deferred,
     write_lane,
 )
-from per_obspy.kernels.pounding_lanes.free_impacts import run_free_impacts, set_states
+from per_obspy.kernels.pounding_lanes.impact_steps import run_free_impacts, set_states
 from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_FUNCTION,
     CONTACT_ROUNDING,

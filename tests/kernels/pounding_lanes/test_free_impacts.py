@@ -1,4 +1,8 @@
-"""Single impacts inside one step, against the event code and against sampled clearances."""
+"""
+Single impacts inside one step, against the event code and against sampled clearances.
+
+Covers ``per_obspy.kernels.pounding_lanes.impact_steps`` too.
+"""
 
 import itertools
 
@@ -8,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import is_lingering
-from per_obspy.kernels.pounding_lanes import free_impacts, lanes
+from per_obspy.kernels.pounding_lanes import free_impacts, impact_steps, lanes
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
@@ -161,10 +165,10 @@ def test_bounces_end_as_in_the_event_code():
         for count, speed, delay in ((0.0, 1e-12, 1e-3), (0.0, 1e-2, 0.0), (25.0, 0.0, 0.0)):
             row[0, columns.BOUNCES] = count
             row[0, columns.STICKING_SPEED], row[0, columns.STICKING_DELAY] = speed, delay
-            free_impacts.set_states(pair, left, right)
+            impact_steps.set_states(pair, left, right)
             load_pair(pair, row)
             expected = is_lingering(row, 0, ground)
-            assert free_impacts._bounces_end(pair, row, left, right) == expected
+            assert impact_steps._bounces_end(pair, row, left, right) == expected
             ends.append(expected)
     assert 0.4 < np.mean(ends) < 0.9
 
@@ -223,11 +227,11 @@ def test_agrees_with_the_event_code(restitution):
         segment = segment_of_step(row, ground_start, ground_end, DURATION)
         # event by event
         fast, expected = row.copy(), row.copy()
-        free_impacts.set_states(pair, *states[:2])
+        impact_steps.set_states(pair, *states[:2])
         load_pair(pair, expected)
         assert run_events(expected, LOG, segment, 0.0)
         # by single impacts, where these carry through the step
-        if free_impacts.run_free_impacts(pair, fast, LOG, *states, segment) < DURATION:
+        if impact_steps.run_free_impacts(pair, fast, LOG, *states, segment) < DURATION:
             continue
         load_pair(pair, fast)
         assert fast[0, columns.IMPACTS] == expected[0, columns.IMPACTS]
