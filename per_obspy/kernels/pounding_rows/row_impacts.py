@@ -10,18 +10,22 @@ import math
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import fall_within
 from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
     apply_impact,
     is_lingering,
     is_touching,
     resolve_contact,
 )
 from per_obspy.kernels.pounding_events.motion import (
+    APPROACH,
     BOUNCE_LIMIT,
+    BOUNCES,
     CLEARANCE_ORDER,
     EVENT_FUNCTION,
     IN_CONTACT,
     LARGEST_DISPLACEMENT,
     PHASE,
+    RESTITUTION,
     STICKING_SPEED,
     TERM_COUNT,
     UNLOADING,
@@ -29,6 +33,7 @@ from per_obspy.kernels.pounding_events.motion import (
     U,
     V,
     fill_clearance,
+    mass_share,
 )
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.free_impacts import (
@@ -36,7 +41,6 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     CLOSES_ONCE,
     STAYS_OPEN,
     locate_impact,
-    predict_clearance,
     state_inside_step,
     states_inside_step,
 )
@@ -54,7 +58,9 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     may_yield,
     raise_maxima_inside,
 )
+from per_obspy.kernels.pounding_rows.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_rows.member_phases import update_phases
+from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 
 # columns of the states of a row in a step: displacement, velocity over omega and acceleration over
 # omega² (m), at the start of a piece, at the end of the step, and at an event
@@ -151,22 +157,28 @@ def _exact_closing_share(members, row, states, j, elapsed, segment):
 @lean
 def _closing_share(members, row, states, j, elapsed, segment):
     """Return the share of the step at which an open interface closes, infinite if it does not."""
-    # far enough from each other at both ends
-    if not may_meet_or_part(members, row, states, j, 0.0, 0.0):
+    # far enough from each other at both ends; those that have just met are not
+    if row[j, CLEARANCE_ORDER] != 1.0 and not may_meet_or_part(members, row, states, j, 0.0, 0.0):
         return math.inf
     left = state(states, j, START)
     right = state(states, j + 1, START)
     next_left = state(states, j, END)
     next_right = state(states, j + 1, END)
     remaining = 1.0 - elapsed
-    prediction = predict_clearance(members[j], left, right, next_left, next_right, remaining)
     # a clearance without value and rate is left to the polynomials
-    if row[j, CLEARANCE_ORDER] <= 1.0:
-        if prediction == STAYS_OPEN:
+    order = row[j, CLEARANCE_ORDER]
+    if order <= 1.0:
+        one = members[j]
+        duration = segment.duration
+        has_met = order == 1.0
+        if stays_open(one, left, right, next_left, next_right, remaining, duration, has_met):
             return math.inf
-        if prediction == CLOSES_NOW:
+        course = clearance_course(one, left, right, next_left, next_right, remaining, duration)
+        if course == STAYS_OPEN:
+            return math.inf
+        if course == CLOSES_NOW:
             return elapsed
-        if prediction == CLOSES_ONCE:
+        if course == CLOSES_ONCE:
             share, _, _ = locate_impact(
                 members[j], row[j : j + 2], left, right, next_left, next_right, remaining, segment
             )
@@ -246,6 +258,25 @@ def _is_alone(row, hit):
     return is_alone
 
 
+@inlined
+def _never_counts(row, j):
+    """Return whether an impact does not count, whatever the fastest of its interface will be."""
+    limit = max(row[j, COUNTED_SPEED], COUNTED_SHARE * row[j, APPROACH])
+    return row[j, V] - row[j + 1, V] <= limit
+
+
+@inlined
+def _apply_unlogged(row, j):
+    """Apply one impact as ``apply_impact``, without a line of the log and without energies."""
+    approach = row[j, V] - row[j + 1, V]
+    # velocities after the impact, (7) and (8)
+    change = (1.0 + row[j, RESTITUTION]) * approach
+    row[j, V] -= change * mass_share(row, j, j + 1, j + 1)
+    row[j + 1, V] += change * mass_share(row, j, j + 1, j)
+    row[j, APPROACH] = max(row[j, APPROACH], approach)
+    row[0, BOUNCES] += 1.0
+
+
 @lean
 def _passes_single_impact(members, row, log, states, elapsed, segment, hit):
     """
@@ -258,7 +289,10 @@ def _passes_single_impact(members, row, log, states, elapsed, segment, hit):
     # the impact
     change = segment.slope * segment.duration
     ground = segment.acceleration + elapsed * change
-    apply_impact(row, log, hit, elapsed * segment.duration)
+    if _never_counts(row, hit):
+        _apply_unlogged(row, hit)
+    else:
+        apply_impact(row, log, hit, elapsed * segment.duration)
     if is_lingering(row, hit, ground):
         return False
     row[hit, CLEARANCE_ORDER] = 1.0
@@ -327,12 +361,14 @@ def run_row_impacts(members, row, log, states, segment):
     """
     change = segment.slope * segment.duration
     elapsed = 0.0
+    is_bilinear = False
     for j in range(row.shape[0]):
         states[j, NEXT_HIT] = UNKNOWN
+        is_bilinear |= row[j, YIELD] < math.inf
     for _ in range(100 * int(row[0, BOUNCE_LIMIT])):
         share = UNKNOWN
         hit = 0
-        if not may_yield_in_piece(members, row, states):
+        if not (is_bilinear and may_yield_in_piece(members, row, states)):
             share, hit = _find_hit(members, row, states, elapsed, segment)
         # no further impact: the end of the step
         if share == math.inf:

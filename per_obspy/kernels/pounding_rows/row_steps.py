@@ -6,7 +6,7 @@ event to event, by the code of single histories (``next_event``).
 """
 
 from per_obspy.kernels._jit import lean
-from per_obspy.kernels.pounding_events.motion import BOUNCES
+from per_obspy.kernels.pounding_events.motion import BOUNCES, IN_CONTACT
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
     START_DISPLACEMENT,
@@ -19,6 +19,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     state_after_step,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import segment_of_step
+from per_obspy.kernels.pounding_rows.clearance_bounds import stays_open
 from per_obspy.kernels.pounding_rows.member_phases import load_row
 from per_obspy.kernels.pounding_rows.row_impacts import (
     END,
@@ -33,10 +34,25 @@ from per_obspy.kernels.pounding_rows.row_impacts import (
 
 
 @lean
-def _may_hold_event(members, row, states, before, after):
+def _is_open_in_step(members, row, states, j, duration):
+    """Return whether an interface is open and certainly stays so in a step, by a cubic."""
+    left = state(states, j, START)
+    right = state(states, j + 1, START)
+    next_left = state(states, j, END)
+    next_right = state(states, j + 1, END)
+    return row[j, IN_CONTACT] == 0.0 and stays_open(
+        members[j], left, right, next_left, next_right, 1.0, duration, False
+    )
+
+
+@lean
+def _may_hold_event(members, row, states, before, after, duration):
     """Return whether bounds do not exclude contact, release, yielding or unloading in a step."""
     for j in range(row.shape[0] - 1):
-        if may_meet_or_part(members, row, states, j, before, after):
+        # by the chord of its contact function, then by a cubic
+        if may_meet_or_part(members, row, states, j, before, after) and not _is_open_in_step(
+            members, row, states, j, duration
+        ):
             return True
     return may_yield_in_piece(members, row, states)
 
@@ -89,7 +105,7 @@ def step_row_through_tile(members, row, log, states, ground, count, duration):
         for i in range(row.shape[0]):
             start = state(states, i, START)
             set_state(states, i, END, state_after_step(members[i], 0, start, before, after))
-        if _may_hold_event(members, row, states, before, after):
+        if _may_hold_event(members, row, states, before, after, duration):
             # the step again, from event to event
             set_members(members, row, states, START)
             load_row(members, row)

@@ -152,6 +152,42 @@ def pair_blocks(parts: NDArray[np.int64], rows: FloatArray) -> list[NDArray[np.i
     return blocks
 
 
+class KeptLogs:
+    """
+    Logs of impacts that are used by one block after another, in each thread others.
+
+    The system clears new memory where it is first written, which takes longer than the impacts
+    that are written there.
+
+    Parameters
+    ----------
+    rows, impacts : int
+        Number of logs, and of lines of each, for which memory is kept; more are new each time.
+    """
+
+    def __init__(self, rows: int, impacts: int) -> None:
+        """Begin without memory."""
+        self.impacts = impacts
+        self._rows = rows
+        self._free: list[FloatArray] = []
+
+    def room(self, rows: int, impacts: int) -> FloatArray:
+        """Return logs (n_rows, n_lines, LOG_COLUMNS) of any content."""
+        if rows > self._rows or impacts != self.impacts:
+            return np.empty((rows, impacts, LOG_COLUMNS))
+        # Threads share the list: another one may take its last
+        try:
+            whole = self._free.pop()
+        except IndexError:
+            whole = np.empty((self._rows, impacts, LOG_COLUMNS))
+        return whole[:rows]
+
+    def keep(self, logs: FloatArray) -> None:
+        """Take back logs that are no longer used."""
+        if logs.base is not None:
+            self._free.append(logs.base)
+
+
 def run_blocks(
     kernel: Callable[..., bool],
     lane_rows: int,
@@ -196,6 +232,7 @@ def run_blocks(
     """
     counts = np.zeros(len(rows), dtype=np.int64)
     records = records_in_steps(components, parts, dt)
+    kept = KeptLogs(PAIR_LANES, FIRST_ROOM)
 
     def run(block: NDArray[np.int64]) -> None:
         """Run one block of pairs, filled up with repetitions that have no free vibration."""
@@ -207,7 +244,8 @@ def run_blocks(
         record = records[steps]
 
         # Results of the block, without the repetitions
-        found = _run_logged(kernel, lane_rows, record, rows[filled], (*direction, free))
+        others = *direction, free
+        found = _run_logged(kernel, lane_rows, record, rows[filled], others, kept)
         if found is None:
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
         rows[block], counts[block] = (result[: block.size] for result in found)
@@ -222,20 +260,24 @@ def _run_logged(
     record: Record,
     rows: FloatArray,
     others: tuple[FloatArray, FloatArray, NDArray[np.int64]],
+    kept: KeptLogs,
 ) -> tuple[FloatArray, NDArray[np.int64]] | None:
     """Return rows at the end and impacts that count of one block; None without end of events."""
-    room, impacts = -1, FIRST_ROOM
+    room = kept.impacts
     # Grow the logs until all impacts of every pair have room
-    while room < impacts:
-        room = impacts
-        logs = np.empty((PAIR_LANES, room, LOG_COLUMNS))
+    while True:
+        logs = kept.room(PAIR_LANES, room)
         # The kernel changes its rows and the steps of free vibration
         own, (cosine, sine, free) = rows.copy(), others
         memory = *_working_memory(lane_rows), own, logs
         if not kernel(record, *memory, cosine, sine, free.copy()):
             return None
         impacts = int(own[:, 0, columns.IMPACTS].max())
-    return own, count_impacts(own, logs)
+        counts = count_impacts(own, logs) if impacts <= room else None
+        kept.keep(logs)
+        if counts is not None:
+            return own, counts
+        room = impacts
 
 
 def _working_memory(lane_rows: int) -> tuple[FloatArray | NDArray[np.int64], ...]:

@@ -116,6 +116,46 @@ def row_maxima(
     Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
     (8).
     """
+    maxima, _ = _maxima(north, east, dt, rows, free_vibration, with_pairs=False)
+    return maxima
+
+
+def row_and_pair_maxima(
+    north: ArrayLike, east: ArrayLike, dt: float, rows: BuildingRows
+) -> tuple[RowMaxima, RowMaxima]:
+    """
+    Compute `row_maxima` and those of every two neighbours without the others of their row.
+
+    Two neighbours that meet no other one in their row are computed once for both.
+
+    Parameters
+    ----------
+    north, east, dt, rows
+        As in `row_maxima`; free vibration is followed.
+
+    Returns
+    -------
+    rows, pairs : RowMaxima
+        One entry per building; the pairs have one line per building, ``(n_buildings, 2)``, of it
+        and the next one, without meaning for the last of each row.
+
+    Raises
+    ------
+    ValueError, RuntimeError
+        As `row_maxima`.
+    """
+    return _maxima(north, east, dt, rows, free_vibration=True, with_pairs=True)
+
+
+def _maxima(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    rows: BuildingRows,
+    free_vibration: bool,
+    with_pairs: bool,
+) -> tuple[RowMaxima, RowMaxima]:
+    """Return the maxima of rows and of pairs alone, where these are computed."""
     # Check every argument; the ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
@@ -126,9 +166,20 @@ def row_maxima(
     # Every building alone, then every part of a row whose gaps may close
     maxima = np.zeros((checked.period.size, MAXIMA))
     maxima[:, :2] = _alone(ground, step, checked, free_vibration)
-    free_radius = maxima[:, 1].copy()
-    run_in_parts(checked, maxima, lambda parts: _run(ground, step, parts, free_vibration))
-    displacement, radius, impact_velocity, impacts = maxima.T
+    free = maxima[:, 1].copy()
+    next_free = np.stack([free, np.append(free[1:], 0.0)], axis=1)
+
+    def run(parts: BuildingRows) -> FloatArray:
+        """Return the maxima of some parts as rows."""
+        return _run(ground, step, parts, free_vibration)
+
+    pairs = run_in_parts(checked, maxima, run, with_pairs)
+    return _named(maxima, free), _named(pairs, next_free)
+
+
+def _named(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
+    """Return maxima by their names."""
+    displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
     return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.history.row_maxima import RowMaxima, row_maxima
-from per_obspy.screening.building_rows.members import IntArray, Members, alone, members_of
+from per_obspy.pounding.history.row_maxima import RowMaxima, row_and_pair_maxima
+from per_obspy.screening.building_rows.members import IntArray, members_of
 from per_obspy.screening.values import Columns, Table
 
 #: Columns of :func:`row_outcomes`; all but the last are NaN without a history.
@@ -55,7 +55,7 @@ def row_outcomes(
         ``OUTCOMES``; displacements are those of the oscillators, m.
     """
     members = members_of(contacts, first, azimuth)
-    found = row_maxima(*motion, members.rows)
+    found, pairs = row_and_pair_maxima(*motion, members.rows)
     amplification = _amplification(found)
     # Both buildings of each contact
     left, right = members.left, members.right
@@ -67,7 +67,7 @@ def row_outcomes(
         "displacement_left": found.displacement[left],
         "displacement_right": found.displacement[right],
     }
-    return {**outcome, **_alone(motion, members, outcome), "reconciled": members.reconciled}
+    return {**outcome, **_alone(pairs, left), "reconciled": members.reconciled}
 
 
 def no_outcomes(count: int) -> Columns:
@@ -76,34 +76,15 @@ def no_outcomes(count: int) -> Columns:
     return empty | {"reconciled": np.zeros(count, dtype=bool)}
 
 
-def _alone(
-    motion: tuple[FloatArray, FloatArray, float], members: Members, outcome: Columns
-) -> Columns:
-    """Return the outcome of each pair without its row; a row of two buildings equals its pair."""
-    names = ("impacts", "impact_velocity", "amplification_left", "amplification_right")
-    columns = {name: outcome[name].copy() for name in names}
-    # Contacts of rows of three and more
-    rows = members.rows
-    sizes = np.diff(rows.first)
-    longer = np.flatnonzero(np.repeat(sizes, sizes - 1) > 2)
-    if longer.size:
-        # Two buildings each
-        azimuth = np.repeat(rows.azimuth, sizes - 1)[longer]
-        found = row_maxima(*motion, alone(rows, members.left[longer], azimuth))
-        amplification = _amplification(found)
-        columns["impacts"][longer] = found.impacts[::2]
-        columns["impact_velocity"][longer] = found.impact_velocity[::2]
-        columns["amplification_left"][longer] = amplification[::2]
-        columns["amplification_right"][longer] = amplification[1::2]
-    return {_name_alone(name): column for name, column in columns.items()}
-
-
-def _name_alone(name: str) -> str:
-    """Return the name of an outcome column for the pair without its row."""
-    for side in ("_left", "_right"):
-        if name.endswith(side):
-            return f"{name.removesuffix(side)}_alone{side}"
-    return f"{name}_alone"
+def _alone(pairs: RowMaxima, left: IntArray) -> Columns:
+    """Return the outcome of each pair without its row."""
+    amplification = _amplification(pairs)
+    return {
+        "impacts_alone": pairs.impacts[left, 0].astype(np.float64),
+        "impact_velocity_alone": pairs.impact_velocity[left, 0],
+        "amplification_alone_left": amplification[left, 0],
+        "amplification_alone_right": amplification[left, 1],
+    }
 
 
 def _amplification(found: RowMaxima) -> NDArray[np.float64]:

@@ -119,28 +119,6 @@ def _modal_masses(contacts: Table) -> tuple[FloatArray, FloatArray]:
     return mass_1 * np.square(share_1), mass_2 * np.square(share_2)
 
 
-def alone(rows: BuildingRows, left: IntArray, azimuth: FloatArray) -> BuildingRows:
-    """
-    Return interfaces as separate rows of two buildings.
-
-    Parameters
-    ----------
-    rows : BuildingRows
-        Rows of any length.
-    left : (n,) ndarray of int
-        Numbers of the buildings before the interfaces.
-    azimuth : (n,) ndarray
-        Of the axis of each, degrees.
-    """
-    ends = np.stack([left, left + 1], axis=1).ravel()
-    fields = {
-        name: column[ends]
-        for name, column in rows._asdict().items()
-        if name not in ("first", "azimuth")
-    }
-    return BuildingRows(first=2 * np.arange(left.size + 1), **fields, azimuth=azimuth)
-
-
 class _Joined(NamedTuple):
     """Property of each building, and whether its two descriptions differ."""
 

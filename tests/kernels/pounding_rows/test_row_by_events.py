@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.pounding.history.pair_blocks import records_in_steps
+from per_obspy.pounding.history.pair_blocks import KeptLogs, records_in_steps
 from per_obspy.pounding.history.rows.row_blocks import run_logged_block
 
 
@@ -29,9 +29,8 @@ def test_events_and_lanes_agree():
     row, log = start_of(3), np.empty((1000, LOG_COLUMNS))
     assert run_row_by_events(*ground, 0.6, 0.8, 0.02, 1, row, log, 64)
     angle, free = np.array([np.arctan2(0.8, 0.6)]), np.array([64])
-    lines, logs = run_logged_block(
-        records_in_steps(ground, [1], 0.02)[1], start_of(3), np.array([0, 3]), angle, free
-    )
+    record, kept = records_in_steps(ground, [1], 0.02)[1], KeptLogs(1, 4096)
+    lines, logs = run_logged_block(record, start_of(3), np.array([0, 3]), angle, free, kept)
     used = int(row[:, columns.IMPACTS].sum())
     assert used > 3
     # both are exact but for the end of bounces

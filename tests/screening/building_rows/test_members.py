@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.screening.building_rows.members import alone, members_of
+from per_obspy.screening.building_rows.members import members_of
 
 from .terraces import contacts
 
@@ -66,12 +66,3 @@ def test_a_yield_displacement_of_one_pair_is_that_of_the_building():
     found = members(table)
     assert found.rows.yield_displacement.tolist() == [np.inf, 0.02, np.inf]
     assert found.reconciled.all()
-
-
-def test_an_interface_alone_has_the_two_buildings_of_the_row():
-    found = members(contacts(4))
-    pair = alone(found.rows, np.array([2]), np.array([30.0]))
-    assert pair.first.tolist() == [0, 2]
-    assert pair.period.tolist() == found.rows.period[2:4].tolist()
-    assert pair.gap[0] == found.rows.gap[2]
-    assert pair.azimuth.tolist() == [30.0]

@@ -1,24 +1,33 @@
 """Rows of buildings in blocks of 32 lanes: packing, working memory and threads."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
 from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
-from per_obspy.pounding.history.pair_blocks import aligned, records_in_steps, run_blocks
+from per_obspy.pounding.history.pair_blocks import (
+    KeptLogs,
+    aligned,
+    records_in_steps,
+    run_blocks,
+)
 from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]
 
-#: Impacts of a row for which there is room at first. Pages that stay unused take no memory.
-FIRST_ROOM = 1 << 16
+#: Impacts of a row that may count for which there is room at first.
+FIRST_ROOM = 1 << 14
+
+#: Rows of which a block keeps the logs: as many rows of three buildings as it has.
+MOST_ROWS = PAIR_LANES // 3
 
 
 def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArray]:
@@ -95,13 +104,13 @@ def run_row_blocks(
     RuntimeError
         If a step has more events than any record causes.
     """
-    counts = np.zeros(len(lines), dtype=np.int64)
     sizes = np.diff(first)
     # Rows of two are pairs, of which a block has more
-    pairs = np.flatnonzero(sizes == 2)
-    steps = parts[pairs], free_steps[pairs], azimuth[pairs]
-    counts[first[pairs]] = _run_pairs(ground, dt, first[pairs], lines, steps)
+    counts = np.zeros(len(lines), dtype=np.int64)
+    left, steps = _pairs(first, parts, free_steps, azimuth)
+    counts[left] = _run_pairs(ground, dt, left, lines, steps)
     records = records_in_steps(ground, parts, dt)
+    kept = KeptLogs(MOST_ROWS, FIRST_ROOM)
 
     def run(block: IntArray) -> None:
         """Run the rows of one block, and write their results to their places."""
@@ -109,11 +118,20 @@ def run_row_blocks(
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         record = records[int(parts[block[0]])]
         others = azimuth[block], free_steps[block]
-        found = _counted_block(record, lines[members], sizes[block], others, scale[members])
+        start, own = lines[members], sizes[block]
+        found = _counted_block(record, start, own, others, scale[members], kept)
         lines[members], counts[members] = found
 
     map_in_threads(run, packed_rows(first, parts, np.flatnonzero(sizes != 2)))
     return counts
+
+
+def _pairs(
+    first: IntArray, *columns_of_rows: NDArray[Any]
+) -> tuple[IntArray, tuple[NDArray[Any], ...]]:
+    """Return the left buildings of rows of two, and columns of these rows."""
+    pairs = np.flatnonzero(np.diff(first) == 2)
+    return first[pairs], tuple(column[pairs] for column in columns_of_rows)
 
 
 def _run_pairs(
@@ -121,7 +139,7 @@ def _run_pairs(
     dt: float,
     left: IntArray,
     lines: FloatArray,
-    steps: tuple[IntArray, IntArray, FloatArray],
+    steps: tuple[NDArray[Any], ...],
 ) -> IntArray:
     """Carry rows of two from their left buildings through a record; return impacts that count."""
     both = left[:, np.newaxis] + np.arange(2)
@@ -137,19 +155,26 @@ def _counted_block(
     sizes: IntArray,
     others: tuple[FloatArray, IntArray],
     scale: FloatArray,
+    kept: KeptLogs,
 ) -> tuple[FloatArray, IntArray]:
     """Return the buildings of one block at the end, and impacts that count."""
     firsts = np.concatenate([[0], np.cumsum(sizes)])
-    own, logs = run_logged_block(record, start, firsts, *others)
+    own, logs = run_logged_block(record, start, firsts, *others, kept)
     # Row by row
     counts = []
     for begin, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
         counts.append(count_row_impacts(own[begin:end], log, scale[begin:end]))
+    kept.keep(logs)
     return own, np.concatenate(counts)
 
 
 def run_logged_block(
-    record: Record, start: FloatArray, firsts: IntArray, azimuth: FloatArray, free: IntArray
+    record: Record,
+    start: FloatArray,
+    firsts: IntArray,
+    azimuth: FloatArray,
+    free: IntArray,
+    kept: KeptLogs,
 ) -> tuple[FloatArray, FloatArray]:
     """
     Carry the rows of one block through a record, with a log of every impact.
@@ -166,13 +191,15 @@ def run_logged_block(
         Of the axis of each row, rad.
     free : (n_rows,) ndarray of int
         Sampling intervals of free vibration at most.
+    kept : KeptLogs
+        Memory of the logs; to be given back.
 
     Returns
     -------
     lines : (n_buildings, ROW_COLUMNS) ndarray
         Buildings at the end.
     logs : (n_rows, n_lines, LOG_COLUMNS) ndarray
-        All impacts of each row.
+        All impacts of each row that may count.
 
     Raises
     ------
@@ -180,11 +207,10 @@ def run_logged_block(
         If a step has more events than any record causes.
     """
     direction = np.cos(azimuth), np.sin(azimuth)
-    room, impacts = -1, FIRST_ROOM
+    room = kept.impacts
     # Grow the logs until all impacts of every row have room
-    while room < impacts:
-        room = impacts
-        logs = np.empty((firsts.size - 1, room, LOG_COLUMNS))
+    while True:
+        logs = kept.room(firsts.size - 1, room)
         # The kernels change the lines and the steps of free vibration
         own = start.copy()
         if len(own) > PAIR_LANES:
@@ -194,7 +220,10 @@ def run_logged_block(
         if not is_through:
             raise RuntimeError("no end of events in a step of a row")
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
-    return own, logs
+        if impacts <= room:
+            return own, logs
+        kept.keep(logs)
+        room = impacts
 
 
 def _run_alone(

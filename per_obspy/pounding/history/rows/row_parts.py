@@ -70,10 +70,15 @@ def parts_of(rows: BuildingRows, is_end: BoolArray, chosen: BoolArray) -> Buildi
 
 
 def run_in_parts(
-    rows: BuildingRows, maxima: FloatArray, run: Callable[[BuildingRows], FloatArray]
-) -> None:
+    rows: BuildingRows,
+    maxima: FloatArray,
+    run: Callable[[BuildingRows], FloatArray],
+    with_pairs: bool,
+) -> FloatArray:
     """
-    Compute the maxima of rows by their parts.
+    Compute the maxima of rows by their parts, and those of pairs of neighbours alone.
+
+    A part of two buildings is a pair alone, and is computed once for both.
 
     Parameters
     ----------
@@ -83,15 +88,55 @@ def run_in_parts(
         Maxima of every building alone, its displacement first; then those in its row.
     run : callable
         Return the maxima of checked rows of two buildings and more.
+    with_pairs : bool
+        Whether pairs of longer parts are computed too.
+
+    Returns
+    -------
+    (n_buildings, 2, n_maxima) ndarray
+        Maxima of each building and the next one without the others of their row: without contact
+        where their gap stays open, and where the pair is not computed.
     """
     is_end = stays_open(rows, maxima[:, 0])
-    waiting = _number_in_part(is_end) > 1
-    while waiting.any():
-        maxima[waiting] = run(parts_of(rows, is_end, waiting))
-        # gaps that these motions may close
+    number = _number_in_part(is_end)
+    # Parts of two among the pairs that may meet
+    two = np.flatnonzero(~is_end & (number == 2))
+    pairs = _pairs_alone(rows, maxima, run, np.flatnonzero(~is_end) if with_pairs else two)
+    maxima[two], maxima[two + 1] = pairs[two, 0], pairs[two, 1]
+
+    # Longer parts, then those with gaps that these motions may close
+    waiting = number > 2
+    while True:
+        if waiting.any():
+            maxima[waiting] = run(parts_of(rows, is_end, waiting))
         closes = is_end & ~stays_open(rows, maxima[:, 0])
+        if not closes.any():
+            return pairs
         is_end &= ~closes
         waiting = _in_parts_of(is_end, closes)
+
+
+def _pairs_alone(
+    rows: BuildingRows,
+    maxima: FloatArray,
+    run: Callable[[BuildingRows], FloatArray],
+    left: IntArray,
+) -> FloatArray:
+    """Return the maxima of all buildings with the next ones, those of some pairs in contact."""
+    last = len(maxima) - 1
+    after = np.minimum(np.arange(1, len(maxima) + 1), last)
+    pairs = np.stack([maxima, maxima[after]], axis=1)
+    if left.size:
+        pairs[left] = run(_pairs_of(rows, left)).reshape(left.size, 2, -1)
+    return pairs
+
+
+def _pairs_of(rows: BuildingRows, left: IntArray) -> BuildingRows:
+    """Return some buildings, each with the next one, as rows of two."""
+    both = np.stack([left, left + 1], axis=1).ravel()
+    fields = {name: getattr(rows, name)[both] for name in BUILDING_FIELDS}
+    azimuth = np.repeat(rows.azimuth, np.diff(rows.first))[left]
+    return with_ends(BuildingRows(2 * np.arange(left.size + 1), **fields, azimuth=azimuth))
 
 
 def _part_of(is_end: BoolArray) -> IntArray:

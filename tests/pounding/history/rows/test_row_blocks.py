@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.kernels.pounding_events import contact as log_columns
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.pounding.history.pair_blocks import records_in_steps
+from per_obspy.pounding.history.pair_blocks import KeptLogs, records_in_steps
 from per_obspy.pounding.history.rows.row_blocks import (
     packed_rows,
     run_logged_block,
@@ -51,7 +51,7 @@ def test_momentum_and_energy_close_at_every_impact(gap):
     noise = np.convolve(np.random.default_rng(3).normal(size=400), np.ones(5) / 5, mode="same")
     record = records_in_steps(np.stack([6.0 * noise, np.zeros(400)]), [1], 0.02)[1]
     none = np.zeros(2, dtype=np.int64)
-    lines, logs = run_logged_block(record, start, firsts, np.zeros(2), none)
+    lines, logs = run_logged_block(record, start, firsts, np.zeros(2), none, KeptLogs(2, 4096))
     for first, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
         row = lines[first:end]
         impacts = log[: int(row[:, columns.IMPACTS].sum())]
@@ -85,21 +85,21 @@ def test_a_step_without_end_is_an_error(size):
     start, firsts = rows_at_rest([size], 0.001, seed=4)
     start[:, columns.BOUNCE_LIMIT] = 0.0
     record = records_in_steps(np.stack([np.sin(np.arange(60.0)), np.zeros(60)]), [1], 0.02)[1]
+    none = np.zeros(1, dtype=np.int64)
     with pytest.raises(RuntimeError, match="no end of events"):
-        run_logged_block(record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64))
+        run_logged_block(record, start, firsts, np.zeros(1), none, KeptLogs(1, 4096))
 
 
-def test_a_log_that_is_too_short_grows(monkeypatch):
+def test_a_log_that_is_too_short_grows():
     # catches: impacts beyond the room that are counted from memory that holds none
     start, firsts = rows_at_rest([4], 0.01, seed=5)
     record = records_in_steps(
         np.stack([5 * np.sin(np.arange(200.0) / 8), np.zeros(200)]), [1], 0.02
     )[1]
     arguments = record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64)
-    lines, logs = run_logged_block(*arguments)
+    lines, logs = run_logged_block(*arguments, KeptLogs(1, 4096))
     used = int(lines[:, columns.IMPACTS].sum())
-    monkeypatch.setattr("per_obspy.pounding.history.rows.row_blocks.FIRST_ROOM", 3)
-    _, grown = run_logged_block(*arguments)
+    _, grown = run_logged_block(*arguments, KeptLogs(1, 3))
     assert used > 3
     assert_array_equal(grown[0, :used], logs[0, :used])
 
@@ -110,7 +110,7 @@ def test_lanes_without_contact_give_the_spectrum():
     noise = np.convolve(np.random.default_rng(6).normal(size=400), np.ones(5) / 5, mode="same")
     ground = np.stack([np.append(noise, 0.0), np.zeros(401)])
     record, many = records_in_steps(ground, [1], 0.02)[1], np.full(3, 4096)
-    lines, _ = run_logged_block(record, start, firsts, np.zeros(3), many)
+    lines, _ = run_logged_block(record, start, firsts, np.zeros(3), many, KeptLogs(3, 4096))
     period = 2 * np.pi / np.sqrt(start[:, columns.STIFFNESS])
     expected = azimuth_maxima(*ground, 0.02, period, 0.05, 0.0)
     assert not lines[:, columns.IMPACTS].any()
@@ -126,10 +126,28 @@ def test_rows_of_two_in_lanes_of_rows_and_of_pairs():
     noise = np.convolve(np.random.default_rng(9).normal(size=400), np.ones(5) / 5, mode="same")
     ground = np.stack([np.append(4.0 * noise, 0.0), np.zeros(401)])
     ones, free = np.ones(12, dtype=np.int64), np.full(12, 320)
-    lines, _ = run_logged_block(
-        records_in_steps(ground, [1], 0.02)[1], start, firsts, np.zeros(12), free
-    )
+    record = records_in_steps(ground, [1], 0.02)[1]
+    lines, _ = run_logged_block(record, start, firsts, np.zeros(12), free, KeptLogs(12, 4096))
     motion = ground, 0.02, firsts, start, ones, free, np.zeros(12)
     assert run_row_blocks(*motion, np.ones(24)).sum() > 300
     index = [columns.LARGEST_DISPLACEMENT, columns.LARGEST_RADIUS_SQUARED, columns.APPROACH]
     assert_allclose(start[:, index], lines[:, index], rtol=1e-9)
+
+
+def test_logs_are_used_again_by_the_next_block():
+    # catches: new memory for every block, one memory for two blocks at a time, logs cut too short
+    kept = KeptLogs(3, 8)
+    first, second = kept.room(3, 8), kept.room(2, 8)
+    assert not np.shares_memory(first, second)
+    kept.keep(first)
+    again = kept.room(1, 8)
+    assert again.shape == (1, 8, log_columns.LOG_COLUMNS)
+    assert np.shares_memory(again, first)
+    kept.keep(again)
+    # more than it keeps is new and not kept
+    for rows, impacts in ((4, 8), (1, 9)):
+        larger = kept.room(rows, impacts)
+        assert larger.shape[:2] == (rows, impacts)
+        assert not np.shares_memory(larger, first)
+        kept.keep(larger)
+    assert np.shares_memory(kept.room(3, 8), first)

@@ -5,7 +5,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.history.row_maxima import (
+    BuildingRows,
+    row_and_pair_maxima,
+    row_maxima,
+)
 from per_obspy.pounding.history.rows import row_parts
 from per_obspy.pounding.history.rows.row_parts import parts_of, run_in_parts, stays_open
 from per_obspy.pounding.history.rows.row_tables import checked_rows
@@ -87,14 +91,14 @@ def test_parts_are_joined_until_no_gap_closes():
 
     # the motion of the first two reaches 0.6 m
     maxima = alone.copy()
-    run_in_parts(rows, maxima, run)
+    run_in_parts(rows, maxima, run, False)
     assert seen == [[2]]
     assert_array_equal(maxima[:, 0], [0.6, 0.6, 0.1, 0.1, 0.1])
     # that of three 0.9 m, that of four 1.2 m
     rows.gap[1] = 0.7
     maxima = alone.copy()
     seen.clear()
-    run_in_parts(rows, maxima, run)
+    run_in_parts(rows, maxima, run, False)
     assert seen == [[2], [3], [4]]
     assert_allclose(maxima[:, 0], [1.2, 1.2, 1.2, 1.2, 0.1], rtol=1e-12)
 
@@ -130,3 +134,39 @@ def test_parts_have_the_axis_and_the_buildings_of_their_rows():
     assert_array_equal(parts.participation_left, [1.0, 1.0, 2.0])
     assert_array_equal(parts.participation_right, [1.0, 3.0, 1.0])
     assert_array_equal(parts.gap, [1.0, 0.2, 1.0])
+
+
+def test_pairs_alone_have_no_other_neighbours():
+    # catches: a pair with the gap or the axis of another, a part of two computed once more
+    rows = row_of([0.001, 5.0, 0.01, 0.02], [0.5, 0.9, 0.6, 1.1, 0.4], [2.0, 1.0, 3.0, 1.0, 2.0])
+    found, pairs = row_and_pair_maxima(PULSE, 0.0 * PULSE, DT, rows)
+    expected = row_maxima(PULSE, 0.0 * PULSE, DT, rows)
+    for name, values in expected._asdict().items():
+        assert_array_equal(getattr(found, name), values, err_msg=name)
+    for left in range(4):
+        both = slice(left, left + 2)
+        fields = {name: getattr(rows, name)[both] for name in rows._fields[1:-1]}
+        pair = BuildingRows(np.array([0, 2]), **fields, azimuth=np.zeros(1))
+        alone = row_maxima(PULSE, 0.0 * PULSE, DT, pair)
+        # a lane does not depend on the others
+        assert_array_equal(pairs.radius[left], alone.radius)
+        assert_array_equal(pairs.free_radius[left], alone.free_radius)
+        assert pairs.impacts[left, 0] == alone.impacts[0]
+        assert pairs.impact_velocity[left, 0] == alone.impact_velocity[0]
+    assert found.impacts[3] != pairs.impacts[3, 0]
+
+
+def test_a_part_of_two_is_computed_once_for_its_row_and_alone():
+    # catches: pairs alone that are computed again
+    rows = checked_rows(row_of([0.1, 5.0, 0.1, 0.1], [1.0] * 5, [1.0] * 5))
+    seen = []
+
+    def run(parts):
+        seen.append(np.diff(parts.first).tolist())
+        return np.arange(1.0, parts.period.size + 1.0)[:, None]
+
+    maxima = np.full((5, 1), 0.3)
+    pairs = run_in_parts(rows, maxima, run, True)
+    assert seen == [[2, 2, 2], [3]]
+    assert_array_equal(pairs[[0, 2, 3], :, 0], [[1, 2], [3, 4], [5, 6]])
+    assert_array_equal(maxima[:, 0], [1, 2, 1, 2, 3])
