@@ -34,6 +34,7 @@ from per_obspy.screening.by_record.station_motion import StationMotion, station_
 from per_obspy.screening.ground_motion.assignment import Stations, assigned, stations_of
 from per_obspy.screening.values import Columns
 from per_obspy.spectra.storage import read_spectra
+from per_obspy.threads import use_one_thread
 
 PAIRS, TOGETHER, PROCESSES = 50_000, 10_000, 2
 
@@ -96,7 +97,7 @@ def main(count: int) -> None:
         measured(configuration)
         folder = Path(room, "output", "stations")
         sizes = [min(TOGETHER, count - first) for first in range(0, count, TOGETHER)]
-        with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        with ProcessPoolExecutor(PROCESSES, get_context("spawn"), use_one_thread) as pool:
             # Compiled kernels are loaded before
             list(pool.map(compute, [folder] * 2 * PROCESSES, range(2 * PROCESSES), [500] * 4))
             start = time.perf_counter()

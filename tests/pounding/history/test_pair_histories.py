@@ -81,6 +81,40 @@ class TestAgainstSingleHistories:
                 assert maxima.impacts[i] == history.impacts["counted"].sum()
             assert (maxima.impact_velocity[i] == 0.0) == (len(history.impacts) == 0)
 
+    def test_pairs_with_a_gap_one_by_one(self):
+        # catches: an impact missed, counted twice or out of time; one of the edge cases left to
+        # other formulas
+        acceleration, fields = shaking(), self.gap_pairs(32)
+        maxima = pounding_histories(acceleration, DT, **fields)
+        for i in range(32):
+            history = single(acceleration, fields, i)
+            # the required agreement
+            assert_allclose(maxima.per[:, i], history.per, rtol=1e-9)
+            assert_allclose(
+                maxima.displacement_maxima[:, i], history.displacement_maxima, rtol=1e-9
+            )
+            assert maxima.impacts[i] == history.impacts["counted"].sum()
+        # most of them pound, and more than once
+        assert np.median(maxima.impacts) > 3
+
+    @staticmethod
+    def gap_pairs(count):
+        """Return pairs with a gap, the first of them edge cases."""
+        random = np.random.default_rng(8)
+        fields = TestAgainstSingleHistories.linear_pairs(count)
+        fields["gap"] = random.uniform(0.005, 0.05, count)
+        for k in (1, 2):
+            fields[f"damping_{k}"] = random.uniform(0.02, 0.1, count)
+        # inelastic, elastic, a wall on either side, so stiff that intervals are cut, hardly a gap
+        fields["restitution"][:2] = 0.0, 1.0
+        fields["mass_1"][2] = fields["mass_2"][3] = math.inf
+        fields["period_1"][4] = 0.04
+        fields["gap"][5] = 1e-6
+        # equal but for damping, yielding
+        fields["period_2"][6] = fields["period_1"][6]
+        fields["yield_displacement_1"][7:9] = fields["yield_displacement_2"][8:10] = 0.01
+        return fields
+
     def test_first_impacts(self):
         # catches: an impact counted twice, an approach speed taken after the impact
         acceleration, fields = shaking(), self.linear_pairs(32)
@@ -100,22 +134,6 @@ class TestAgainstSingleHistories:
             assert_allclose(maxima.impact_velocity, approach.max(), rtol=1e-9)
             checked += 1
         assert checked > 5
-
-    def test_pairs_with_gaps_one_by_one(self):
-        # catches: an early end of a history that still changes it, an impact counted otherwise
-        acceleration, fields, count = shaking(), self.linear_pairs(40), 0
-        fields["gap"] = np.random.default_rng(4).uniform(0.005, 0.08, 40)
-        maxima = pounding_histories(acceleration, DT, **fields)
-        for i in range(40):
-            history = single(acceleration, fields, i)
-            assert maxima.impacts[i] == history.impacts["counted"].sum()
-            # both exact: rounding, which grows with the impacts, of which there are up to 250
-            assert_allclose(maxima.per[:, i], history.per, rtol=1e-12)
-            assert_allclose(
-                maxima.displacement_maxima[:, i], history.displacement_maxima, rtol=1e-12
-            )
-            count += len(history.impacts)
-        assert count > 400
 
     @staticmethod
     def linear_pairs(count):
