@@ -9,10 +9,11 @@ from per_obspy.screening.warmup import PARTS, compile_part
 from per_obspy.threads import usable_processors
 
 #: Stage of the progress.
-COMPILING = "compiling kernels"
+COMPILING = "compiling kernels (once, one to two minutes)"
 
-#: What is left when all parts are compiled: kernels that only whole tables reach.
-REST = "screening"
+#: Parts that are compiled last: the kernels that only whole tables reach, which call those of the
+#: other parts, and the part that shares the fewest with them.
+LAST = ("screening", "spectra")
 
 
 def compile_kernels(progress: Progress) -> None:
@@ -29,17 +30,18 @@ def compile_kernels(progress: Progress) -> None:
     Unfinished
         If a part cannot be compiled.
     """
-    total = len(PARTS) + 1
+    total = len({*PARTS, *LAST})
     progress(COMPILING, 0, total)
     for done, _ in enumerate(_compiled(), start=1):
         progress(COMPILING, done, total)
 
 
 def _compiled() -> Iterator[str]:
-    """Yield the names of the parts as they are compiled, the rest last."""
+    """Yield the names of the parts as they are compiled."""
     work = Work(compile_part, _failed)
-    yield from results(PARTS, work, usable_processors(), None)
-    yield from results([REST], work, 1, None)
+    first = [name for name in PARTS if name not in LAST]
+    yield from results(first, work, usable_processors(), None)
+    yield from results(LAST, work, usable_processors(), None)
 
 
 def _failed(name: str, reason: str) -> str:
