@@ -14,7 +14,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     STAYS_OPEN,
     states_inside_step,
 )
-from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
+from per_obspy.kernels.pounding_lanes.lanes import CONTACT_FUNCTION, LANE_ROWS
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state
 from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
 from per_obspy.kernels.pounding_rows.clearance_bounds import clearance_course, stays_open
@@ -57,6 +57,113 @@ def piece_of(random, has_met):
     inside = [states_inside_step(pair, row, left, right, change, share * s) for s in INSIDE]
     clearances = np.array([row[0, columns.GAP] - a[0] + b[0] for a, b in inside])
     return (pair, left, right, *ends, share), clearances
+
+
+class LinearPair:
+    """
+    Two random oscillators in a random piece, whose motion is linear in six numbers.
+
+    These are displacement and velocity over omega of both, and the ground acceleration with its
+    change over a step.
+    """
+
+    def __init__(self, random):
+        self.pair, self.row, self.omega = pair_of(random)
+        self.share = random.uniform(0.3, 1.0)
+        # Rates of the clearance at all times and at both ends, and its growth up to every time
+        motions = [self.motion(unit) for unit in np.eye(6)]
+        self.all_rates = np.transpose([self.rates_of(*motion) for motion in motions])
+        self.rates = self.all_rates[[0, -1]]
+        self.growth = np.transpose([self.growth_of(*motion) for motion in motions])
+
+    def motion(self, numbers):
+        """Return the states at the start, and those at every time inside."""
+        first, change = numbers[:5], numbers[5]
+        left = complete_state(self.pair, 0, first[0], first[1], first[4])
+        right = complete_state(self.pair, 35, first[2], first[3], first[4])
+        inside = [
+            states_inside_step(self.pair, self.row, left, right, change, self.share * time)
+            for time in INSIDE
+        ]
+        return (left, right), inside
+
+    def rates_of(self, start, inside):
+        """Return the rate of the clearance at the start and at every time inside."""
+        states = start, *inside
+        return [self.omega[1] * right[1] - self.omega[0] * left[1] for left, right in states]
+
+    @staticmethod
+    def growth_of(start, inside):
+        """Return by how much the clearance has grown at every time inside."""
+        first = start[1][0] - start[0][0]
+        return [right[0] - left[0] - first for left, right in inside]
+
+    def numbers_with(self, random, conditions, values):
+        """Return random numbers of which some linear functions have these values."""
+        draw = random.normal(size=6) * [0.02, 0.02, 0.02, 0.02, 1.0, 1.0]
+        correction = np.linalg.lstsq(conditions, values - conditions @ draw, rcond=None)[0]
+        return draw + correction
+
+    def piece(self, numbers, clearance):
+        """Return the arguments of a piece that begins with a clearance; the gap gives it."""
+        (left, right), inside = self.motion(numbers)
+        self.pair[CONTACT_FUNCTION + 4] = clearance + left[0] - right[0]
+        return self.pair, left, right, *inside[-1], self.share, STEP
+
+
+def test_a_piece_that_just_closes_between_its_ends_does_not_stay_open():
+    # catches: a rest that is too small or has the other sign, a control point too far in, a swing
+    # of the rate that is too small
+    random, flat, bowed, rising = np.random.default_rng(9), 0, 0, 0
+    for _ in range(COUNT):
+        one = LinearPair(random)
+        whole = np.vstack([one.rates, one.growth[-1:]])
+        # The cubic is constant; only the rest moves the clearance
+        numbers = one.numbers_with(random, whole, np.zeros(3))
+        flat += dips(one, numbers)
+        flat += dips(one, -numbers)
+        # It falls and rises again, as a parabola
+        rates = random.uniform(0.01, 0.1) * np.array([-1.0, 1.0])
+        bowed += dips(one, one.numbers_with(random, whole, np.append(rates, 0.0)))
+        # Its rates at both ends are positive, and it falls in between
+        slow = one.numbers_with(random, one.rates, np.zeros(2))
+        rate = -random.uniform(0.1, 0.7) * (one.all_rates @ slow).min()
+        rising += dips(one, slow + np.linalg.lstsq(one.rates, np.full(2, rate), rcond=None)[0])
+    assert min(flat, bowed) > 0.5 * COUNT
+    assert rising > 20
+
+
+def dips(one, numbers):
+    """Check a motion whose gap lets it close by a thousandth of its dip; return whether it dips."""
+    growth = one.growth @ numbers
+    dip = -growth.min()
+    # Dips below the rounding of the states are none
+    if dip < 1e-9 * np.abs(numbers[:4]).max() or growth[-1] <= -0.999 * dip:
+        return False
+    piece = one.piece(numbers, 0.999 * dip)
+    assert not stays_open(*piece, False)
+    assert clearance_course(*piece) != STAYS_OPEN
+    return True
+
+
+def test_a_piece_that_closes_again_after_contact_does_not_stay_open():
+    # catches: too little room after the contact, the rate at the start taken for that at the end
+    random, again = np.random.default_rng(10), 0
+    for _ in range(COUNT):
+        one = LinearPair(random)
+        whole = np.vstack([one.rates, one.growth[-1:]])
+        flat = one.numbers_with(random, whole, np.zeros(3))
+        flat *= -np.sign((one.growth @ flat)[len(INSIDE) // 2])
+        dip = -(one.growth @ flat).min()
+        # It leaves the contact, and is back before the end, where it is open
+        rise = random.choice([0.01, 0.1, 1.0, 3.0, 9.0]) * dip
+        values = np.array([rise / (one.share * STEP), 0.0, min(rise, 0.01 * dip)])
+        numbers = flat + np.linalg.lstsq(whole, values, rcond=None)[0]
+        growth = one.growth @ numbers
+        if growth.min() < -1e-9 * np.abs(numbers[:4]).max():
+            again += 1
+            assert not stays_open(*one.piece(numbers, 0.0), True)
+    assert again > 0.3 * COUNT
 
 
 @pytest.mark.parametrize("has_met", [False, True])
