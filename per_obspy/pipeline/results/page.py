@@ -29,13 +29,16 @@ from per_obspy.report.page.content import (
 )
 from per_obspy.report.page.document import write_page
 from per_obspy.report.page.export_columns import MOST_COLUMNS
-from per_obspy.report.page.first_screen import Event
+from per_obspy.report.page.first_screen import Event, PageBuildings
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.summary.statements import event_sentences, station_sentences
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.tables.ranked.ranked_table import RankedTable
 from per_obspy.tables.totals import areas_of
+
+#: Column of the neighbours of a building that can hit it.
+HIT = "neighbours_that_can_hit"
 
 
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
@@ -290,15 +293,26 @@ def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
     return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
 
 
-def _buildings(path: Path) -> pd.DataFrame | None:
+def _buildings(path: Path) -> PageBuildings | None:
     """Return the worst buildings with the columns of the page, None without a table."""
     if not path.is_file():
         return None
     with pq.ParquetFile(path, pre_buffer=False) as file:
         names = [name for name in BUILDING_KINDS if name in file.schema_arrow.names]
-        batches = file.iter_batches(PAGE_PAIRS, columns=names)
-        first = next(batches, None)
-    return None if first is None else first.to_pandas()
+        first = next(file.iter_batches(PAGE_PAIRS, columns=names), None)
+        if first is None:
+            return None
+        # Counted in all rows: the page shows the worst only
+        hit = _hit(file) if HIT in names else None
+    return PageBuildings(first.to_pandas(), hit)
+
+
+def _hit(file: pq.ParquetFile) -> int:
+    """Return the number of buildings that a neighbour can hit."""
+    batches = file.iter_batches(columns=[HIT])
+    return sum(
+        int(np.count_nonzero(batch[HIT].to_numpy(zero_copy_only=False) > 0)) for batch in batches
+    )
 
 
 def _outlines(beside: Path | None, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.report.page.export_columns import addresses, pack_export, text_kind
-from per_obspy.report.page.first_screen import Event, first_screen
+from per_obspy.report.page.first_screen import Event, PageBuildings, first_screen
 from per_obspy.report.page.packing import LONGEST_TEXT, PackedTable, pack_table
 from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases
@@ -111,8 +111,8 @@ class PageData(NamedTuple):
         Tables of the run; ``rejected`` is its beginning.
     rejections : int
         Rows of the whole table of rejections.
-    buildings : DataFrame or None
-        The worst buildings.
+    buildings : PageBuildings or None
+        The worst buildings, and how many a neighbour can hit.
     outlines : list of (str, list of float)
         Buildings and their outlines: longitude and latitude by turns, degrees.
     lines : mapping of str to list
@@ -136,7 +136,7 @@ class PageData(NamedTuple):
     areas: pd.DataFrame
     rejected: pd.DataFrame
     rejections: int
-    buildings: pd.DataFrame | None
+    buildings: PageBuildings | None
     outlines: Sequence[tuple[str, list[float]]]
     lines: Mapping[str, list[list[float]]]
     histories: Mapping[int, dict[str, Any]]
@@ -209,10 +209,11 @@ def _buildings(data: PageData) -> pd.DataFrame:
     """Return the buildings with their prevention in the language of the page."""
     if data.buildings is None:
         return pd.DataFrame()
-    if "prevention" not in data.buildings:
-        return data.buildings
-    sentences = [fixed_phrases(str(text), data.language) for text in data.buildings["prevention"]]
-    return data.buildings.assign(prevention=sentences)
+    worst = data.buildings.worst
+    if "prevention" not in worst:
+        return worst
+    sentences = [fixed_phrases(str(text), data.language) for text in worst["prevention"]]
+    return worst.assign(prevention=sentences)
 
 
 def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:

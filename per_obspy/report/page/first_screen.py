@@ -33,6 +33,22 @@ DOUBTS = {
 }
 
 
+class PageBuildings(NamedTuple):
+    """
+    Buildings of a run, for the page.
+
+    Attributes
+    ----------
+    worst : DataFrame
+        The worst buildings, as many as the page shows.
+    hit : int or None
+        Number of all buildings that a neighbour can hit; None if the table does not know.
+    """
+
+    worst: pd.DataFrame
+    hit: int | None
+
+
 class Event(NamedTuple):
     """
     Facts of the earthquake, as far as the records know them.
@@ -100,7 +116,7 @@ def first_screen(
     tally: PairTally,
     worst: pd.DataFrame,
     tables: tuple[pd.DataFrame, pd.DataFrame],
-    buildings: pd.DataFrame | None,
+    buildings: PageBuildings | None,
     facts: tuple[Language, bool],
 ) -> FirstScreen:
     """
@@ -116,7 +132,7 @@ def first_screen(
         The worst pairs in their order.
     tables : (DataFrame, DataFrame)
         Totals by area, and stations with ``station, state, rejected``.
-    buildings : DataFrame or None
+    buildings : PageBuildings or None
         Buildings, the worst first, if the run has them.
     facts : (Language, bool)
         Language, and whether the motion is simulated.
@@ -220,16 +236,15 @@ def _place_texts(event: Event, language: Language) -> list[str]:
 
 
 def _numbers(
-    tally: PairTally, worst: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
+    tally: PairTally, worst: pd.DataFrame, buildings: PageBuildings | None, language: Language
 ) -> list[tuple[str, str]]:
     """Return the five numbers: pairs, pounding, expected or buildings, worst class, velocity."""
     # Five numbers that a decision needs, the last one in a unit
     texts = LANGUAGES[language]
     sure = tally.states["yes"] + tally.states["likely"]
     numbers = [(float(tally.pairs), "number_pairs"), (float(sure), "number_pounding")]
-    if buildings is not None and "neighbours_that_can_hit" in buildings:
-        hit = float((buildings["neighbours_that_can_hit"] > 0).sum())
-        numbers.append((hit, "number_buildings"))
+    if buildings is not None and buildings.hit is not None:
+        numbers.append((float(buildings.hit), "number_buildings"))
     else:
         numbers.append((tally.expected, "number_expected"))
     counts = [
@@ -263,7 +278,7 @@ def _first(
     tally: PairTally,
     worst: pd.DataFrame,
     areas: pd.DataFrame,
-    buildings: pd.DataFrame | None,
+    buildings: PageBuildings | None,
     facts: tuple[Language, bool],
 ) -> list[str]:
     """Return sentences on first actions."""
@@ -280,12 +295,12 @@ def _first(
 
 
 def _inspected(
-    hit: pd.DataFrame, areas: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
+    hit: pd.DataFrame, areas: pd.DataFrame, buildings: PageBuildings | None, language: Language
 ) -> list[str]:
     """Return sentences on the first inspections: buildings or pairs, and areas."""
     texts, said = LANGUAGES[language], list[str]()
-    if buildings is not None and len(buildings):
-        said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
+    if buildings is not None and len(buildings.worst):
+        said.append(texts["todo_buildings"].format(names=_names(buildings.worst["building_id"])))
     else:
         said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
     # One area is no choice

@@ -12,6 +12,7 @@ import shutil
 import pandas as pd
 import pytest
 
+from per_obspy.pipeline.results import page
 from per_obspy.pipeline.run import report
 
 from ..small_run import page_content, write_configuration
@@ -133,6 +134,17 @@ def test_revision_of_the_run_is_on_the_page(copied):
     report(configuration, copied / "out")
     shown = page_content(copied / "out" / "report.html")["revision"]
     assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
+
+
+def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch):
+    # catches: those counted that the page shows
+    monkeypatch.setattr(page, "PAGE_PAIRS", 3)
+    report(copied / "run.toml")
+    buildings = pd.read_parquet(copied / "out" / "buildings.parquet")
+    hit = int((buildings["neighbours_that_can_hit"] > 0).sum())
+    assert hit > 3
+    number, meaning = page_content(copied / "out" / "report.html")["numbers"][2]
+    assert (number, meaning) == (str(hit), "buildings that a neighbour can hit")
 
 
 def test_rejections_are_counted_and_their_beginning_shown(content):
