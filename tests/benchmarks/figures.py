@@ -22,7 +22,7 @@ import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import parent_process
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,9 @@ SCRIPTS = (
     *("start_up", "formats", "spectra", "stations", "pounding", "rows", "pair_estimates"),
     *("histories", "footprints", "screening"),
 )
+
+#: Description of the processors, on Linux.
+PROCESSORS = Path("/proc/cpuinfo")
 
 #: File that takes one line per figure while the scripts run.
 LINES = "PER_OBSPY_FIGURES"
@@ -92,9 +95,12 @@ def _version(distribution: str) -> str:
 def machine() -> str:
     """Return processor, width of vectors, number of processors, system and Python in words."""
     model = platform.processor() or platform.machine()
-    if Path("/proc/cpuinfo").is_file():
-        named = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text("utf-8"))
-        model = named[1] if named else model
+    if PROCESSORS.is_file():
+        facts = dict(re.findall(r"^(.*?)\s*: (.*)$", PROCESSORS.read_text("utf-8"), re.M))
+        model = facts.get("model name", model)
+        # Virtual machines give processors of several generations one name
+        if {"cpu family", "model"} <= facts.keys():
+            model += f" (family {facts['cpu family']}, model {facts['model']})"
     system = f"{platform.system()}, Python {platform.python_version()}"
     is_full = FULL_WIDTH in os.environ.get("NUMBA_CPU_FEATURES", "")
     vectors = "vectors of full width" if is_full else "width of vectors by the compiler"
@@ -106,7 +112,7 @@ def choose_vectors() -> None:
     if Path(sys.argv[0]).resolve().parent == FOLDER.resolve():
         use_full_vectors()
         # Not once more by each process that the benchmark starts
-        if parent_process() is None:
+        if current_process().name == "MainProcess":
             print(machine(), flush=True)
 
 

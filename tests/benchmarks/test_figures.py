@@ -119,3 +119,17 @@ def test_the_machine_has_the_width_of_its_vectors(monkeypatch):
     assert "vectors of full width" in figures.machine()
     monkeypatch.setenv("NUMBA_CPU_FEATURES", "+avx512f")
     assert "width of vectors by the compiler" in figures.machine()
+
+
+def test_processors_of_one_name_are_told_apart(tmp_path, monkeypatch):
+    names = []
+    monkeypatch.delenv("NUMBA_CPU_FEATURES", raising=False)
+    for family in ("25", "26"):
+        facts = tmp_path / family
+        facts.write_text(f"cpu family\t: {family}\nmodel\t\t: 17\nmodel name\t: AMD EPYC\n")
+        monkeypatch.setattr(figures, "PROCESSORS", facts)
+        names.append(figures.machine().partition(", width")[0])
+    assert names == ["AMD EPYC (family 25, model 17)", "AMD EPYC (family 26, model 17)"]
+    # Other systems have no such file
+    monkeypatch.setattr(figures, "PROCESSORS", tmp_path / "none")
+    assert "family" not in figures.machine()
