@@ -6,6 +6,7 @@ one ramp to zero, and filled up with zeros to whole tiles. Results do not depend
 threads: a block is computed by one of them.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 
@@ -21,6 +22,10 @@ Result = TypeVar("Result")
 
 #: Steps of all oscillators together below which starting threads costs more than it saves.
 STEPS_WORTH_THREADS = 20_000_000
+
+
+#: Of the scale of a record, as a power of two: its inverse must be finite.
+SMALLEST_EXPONENT = -1022
 
 
 class TiledRecord(NamedTuple):
@@ -58,7 +63,7 @@ def tiled_record(north: FloatArray, east: FloatArray | None = None) -> TiledReco
     components = [north] if east is None else [north, east]
     # A power of two is exactly undone afterwards
     peak = max(float(np.abs(component).max()) for component in components)
-    scale = float(2.0 ** np.floor(np.log2(peak))) if peak > 0.0 else 1.0
+    scale = 2.0 ** max(math.floor(math.log2(peak)), SMALLEST_EXPONENT) if peak > 0.0 else 1.0
     scaled = [_closed(component, scale) for component in components]
 
     peaks, jumps = np.zeros((2, 2, (scaled[0].size - 1) // blocks.TILE))
@@ -71,7 +76,8 @@ def _closed(acceleration: FloatArray, scale: float) -> FloatArray:
     """Return the scaled record, filled up with zeros to whole tiles and one sample."""
     tiles = -(-acceleration.size // blocks.TILE)
     closed = np.zeros(tiles * blocks.TILE + 1)
-    np.divide(acceleration, scale, out=closed[: acceleration.size])
+    # The inverse of a power of two is exact, and dividing takes three times as long
+    np.multiply(acceleration, 1.0 / scale, out=closed[: acceleration.size])
     return closed
 
 
@@ -80,11 +86,15 @@ def prepare_oscillators(
 ) -> Oscillators:
     """Return paired oscillators (n,) that feel the first component, or their azimuths (degrees)."""
     omegas = 2.0 * np.pi / periods
-    angles = np.zeros(periods.size) if azimuths is None else np.radians(azimuths)
+    weights = np.zeros((2, periods.size))
+    weights[0] = 1.0
+    if azimuths is not None:
+        angles = np.radians(azimuths)
+        weights[:] = np.cos(angles), np.sin(angles)
     return Oscillators(
         phases=omegas * dt,
         dampings=dampings.copy(),
-        weights=np.stack([np.cos(angles), np.sin(angles)]),
+        weights=weights,
         omegas=omegas,
         size=periods.size,
     )

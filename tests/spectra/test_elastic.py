@@ -94,6 +94,14 @@ def test_powers_of_two_scale_exactly(noise):
     assert_array_equal(per_spectrum(8 * noise, DT, PERIODS), 8 * per_spectrum(noise, DT, PERIODS))
 
 
+def test_the_weakest_record_that_a_float_holds_scales_too(noise):
+    # catches an inverse of the scale that overflows; at 2**-1040 samples and result keep a few
+    # digits only: the smallest number is 2**-1074
+    weak = per_spectrum(noise * 2.0**-1040, DT, PERIODS)
+    once = per_spectrum(noise, DT, PERIODS)
+    assert_allclose(weak * 2.0**1020 * 2.0**20, once, rtol=1e-5)
+
+
 def test_stretched_time_scales_lengths_by_its_square(noise):
     # catches a mixed-up omega: [m] = [m/s²] [s²]
     once, stretched = (

@@ -169,21 +169,26 @@ def largest_in_step(u, z, start, end, damping, phase, selected, work, largest):
         acceleration = start + rate * (i * span)
         fill_series(u, z, acceleration, rate, 1.0, damping, terms, displacement, velocity)
         for number in range(4):
-            # Stationary points of a selected condition; else only the end of the span
-            points[0] = 0.0
-            points[1] = span
-            count = 2
             if selected[number]:
+                # Raise all four values to those at the stationary points inside
                 fill_condition(number, acceleration, rate, damping, terms - 1, velocity, condition)
                 count = stationary_phases(condition, terms - 1, span, points)
-            # Raise all four values to those at the points; the last one starts the next span
-            for k in range(1, count):
-                u = derivative(displacement, terms, 0, points[k])
-                z = derivative(velocity, terms, 0, points[k])
-                largest[0] = max(largest[0], u * u + z * z)
-                largest[1] = max(largest[1], abs(u))
-                largest[2] = max(largest[2], abs(z))
-                largest[3] = max(largest[3], abs(u + 2.0 * damping * z))
+                for k in range(1, count - 1):
+                    raise_values(displacement, velocity, terms, points[k], damping, largest)
+        # The end of the span starts the next one
+        u, z = raise_values(displacement, velocity, terms, span, damping, largest)
+
+
+@kernel
+def raise_values(displacement, velocity, terms, phase, damping, largest):
+    """Raise the largest values to those at a phase; return displacement and velocity there."""
+    u = derivative(displacement, terms, 0, phase)
+    z = derivative(velocity, terms, 0, phase)
+    largest[0] = max(largest[0], u * u + z * z)
+    largest[1] = max(largest[1], abs(u))
+    largest[2] = max(largest[2], abs(z))
+    largest[3] = max(largest[3], abs(u + 2.0 * damping * z))
+    return u, z
 
 
 @kernel

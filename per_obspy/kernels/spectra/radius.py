@@ -33,9 +33,9 @@ LOCAL = STEP
 U, Z, SQUARE, A11, A12, A21, A22 = (row * LANES for row in range(DISPLACED))
 F0, F1, F2, F3, F4, F5, F6, F7, F8 = (row * LANES for row in range(DISPLACED, MOVED))
 G0, G1, G2, G3, G4, G5, G6, G7, G8 = (row * LANES for row in range(MOVED, STEP))
-#: Neighbouring oscillators whose tiles are run again together: one of the widest vectors. Of two
-#: vectors one is computed while the other waits for the step before, but more tiles are run again.
-GROUP = 8
+#: Oscillators with which a tile is run again together: two of the widest vectors, of which one is
+#: computed while the other waits for the step before.
+TOGETHER = 16
 #: Rows by which tiles are ruled out: radius from which a tile is looked at, and what a unit of the
 #: sum of ``|a|`` takes from it, the phase of a step; bound of the radius; largest squared radius;
 #: twice the damping; growth of a radius backwards over a stride.
@@ -145,7 +145,7 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
     # The radii looked at raise the limits of all tiles
     raise_to_tiles(checkpoints, peaks.size, largest)
     limits, marks, pushes = aligned(LIMITS, LANES), np.zeros(LANES, np.int64), np.empty(peaks.size)
-    group = aligned(1, 11 * GROUP)[0]
+    listed, group = np.zeros(LANES, np.int64), aligned(1, 11 * TOGETHER)[0]
     _fill_pushes(acceleration, pushes)
     strongest = pushes.max()
     for lane in range(LANES):
@@ -157,20 +157,17 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
             checkpoints[tile, 2, :] = 0.0
             continue
         _mark_lanes(checkpoints, tile, peaks[tile], jumps[tile], pushes[tile], limits, marks)
-        for first in range(0, LANES, GROUP):
-            if not _any_marked(marks, first):
-                for lane in range(first, first + GROUP):
-                    checkpoints[tile, 2, lane] = 0.0
-                continue
+        count = _list_lanes(checkpoints, tile, marks, listed)
+        for first in range(0, count, TOGETHER):
             # Step by step through the tile
-            _open_group(table, checkpoints, tile, first, group)
+            _open_group(table, checkpoints, tile, listed, first, count, group)
             _run_steps(acceleration, tile * TILE, group)
-            # Only marked lanes are raised, so that none depends on its neighbours
-            for k in range(GROUP):
-                square = group[2 * GROUP + k] if marks[first + k] > 0 else 0.0
-                checkpoints[tile, 2, first + k] = square
-                largest[0, first + k] = max(largest[0, first + k], square)
-            _fill_limits(strongest, phases, dampings, largest, first, GROUP, limits)
+            for k in range(min(TOGETHER, count - first)):
+                lane, square = listed[first + k], group[2 * TOGETHER + k]
+                checkpoints[tile, 2, lane] = square
+                if square > largest[0, lane]:
+                    largest[0, lane] = square
+                    _fill_limits(strongest, phases, dampings, largest, lane, 1, limits)
 
 
 @kernel
@@ -184,22 +181,26 @@ def _any_close(checkpoints, tile, push, limits):
 
 
 @kernel
-def _any_marked(marks, first):
-    """Return whether any lane of a group is marked."""
+def _list_lanes(checkpoints, tile, marks, listed):
+    """List the marked lanes of a tile, set the radii of the others to zero; return the number."""
     count = 0
-    for k in range(GROUP):
-        count += marks[first + k]
-    return count > 0
+    for lane in range(LANES):
+        listed[count] = lane
+        count += marks[lane]
+        checkpoints[tile, 2, lane] = checkpoints[tile, 2, lane] if marks[lane] > 0 else 0.0
+    return count
 
 
 @kernel
-def _open_group(table, checkpoints, tile, first, group):
+def _open_group(table, checkpoints, tile, listed, first, count, group):
     """Fill state and squared radius before a tile, and the coefficients of a step."""
-    for k in range(GROUP):
+    for k in range(TOGETHER):
+        # The last lane fills the group up
+        lane = listed[min(first + k, count - 1)]
         for row in range(3):
-            group[row * GROUP + k] = checkpoints[tile, row, first + k]
+            group[row * TOGETHER + k] = checkpoints[tile, row, lane]
         for row in range(8):
-            group[(3 + row) * GROUP + k] = table[STEP + row, first + k]
+            group[(3 + row) * TOGETHER + k] = table[STEP + row, lane]
 
 
 @kernel
@@ -248,16 +249,16 @@ def _run_steps(acceleration, first, g):
         # Samples of four steps
         p0, p1, p2 = acceleration[i], acceleration[i + 1], acceleration[i + 2]
         p3, p4 = acceleration[i + 3], acceleration[i + 4]
-        for k in range(GROUP):
-            u0, z0 = g[k], g[GROUP + k]
+        for k in range(TOGETHER):
+            u0, z0 = g[k], g[TOGETHER + k]
             a11, a12, a21, a22 = (
-                g[3 * GROUP + k],
-                g[4 * GROUP + k],
-                g[5 * GROUP + k],
-                g[6 * GROUP + k],
+                g[3 * TOGETHER + k],
+                g[4 * TOGETHER + k],
+                g[5 * TOGETHER + k],
+                g[6 * TOGETHER + k],
             )
-            b11, b12, b21 = g[7 * GROUP + k], g[8 * GROUP + k], g[9 * GROUP + k]
-            b22 = g[10 * GROUP + k]
+            b11, b12, b21 = g[7 * TOGETHER + k], g[8 * TOGETHER + k], g[9 * TOGETHER + k]
+            b22 = g[10 * TOGETHER + k]
             # First step (Nigam & Jennings)
             u1 = a11 * u0 + (a12 * z0 + (b11 * p0 + b12 * p1))
             z1 = a21 * u0 + (a22 * z0 + (b21 * p0 + b22 * p1))
@@ -273,5 +274,5 @@ def _run_steps(acceleration, first, g):
             # Largest squared radius
             early = max(u1 * u1 + z1 * z1, u2 * u2 + z2 * z2)
             late = max(u3 * u3 + z3 * z3, u4 * u4 + z4 * z4)
-            g[k], g[GROUP + k] = u4, z4
-            g[2 * GROUP + k] = max(g[2 * GROUP + k], early, late)
+            g[k], g[TOGETHER + k] = u4, z4
+            g[2 * TOGETHER + k] = max(g[2 * TOGETHER + k], early, late)

@@ -151,6 +151,9 @@ def choose_tiles(checkpoints, peaks, jumps, phases, dampings, weights, lanes, la
     # List the tiles beyond the threshold of any quantity
     count = 0
     for tile in range(tiles):
+        # Of most tiles no lane is beyond
+        if not _any_beyond(checkpoints, tile, threshold):
+            continue
         for lane in range(lanes):
             beyond = checkpoints[tile, 2, lane] > threshold[0, lane]
             for row in range(1, quantities):
@@ -160,6 +163,16 @@ def choose_tiles(checkpoints, peaks, jumps, phases, dampings, weights, lanes, la
                 chosen[count, 1] = lane
                 count += 1
     return count
+
+
+@kernel
+def _any_beyond(checkpoints, tile, threshold):
+    """Return whether a tile is beyond the threshold of any quantity and lane."""
+    count = 0
+    for row in range(threshold.shape[0]):
+        for lane in range(LANES):
+            count += checkpoints[tile, 2 + row, lane] > threshold[row, lane]
+    return count > 0
 
 
 @kernel
