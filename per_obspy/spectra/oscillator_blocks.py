@@ -86,6 +86,7 @@ def prepare_oscillators(
 ) -> Oscillators:
     """Return paired oscillators (n,) that feel the first component, or their azimuths (degrees)."""
     omegas = 2.0 * np.pi / periods
+    # Shares of both components
     weights = np.zeros((2, periods.size))
     weights[0] = 1.0
     if azimuths is not None:

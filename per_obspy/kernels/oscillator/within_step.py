@@ -184,6 +184,7 @@ def raise_values(displacement, velocity, terms, phase, damping, largest):
     """Raise the largest values to those at a phase; return displacement and velocity there."""
     u = derivative(displacement, terms, 0, phase)
     z = derivative(velocity, terms, 0, phase)
+    # Squared radius, displacement, velocity, absolute acceleration
     largest[0] = max(largest[0], u * u + z * z)
     largest[1] = max(largest[1], abs(u))
     largest[2] = max(largest[2], abs(z))
