@@ -28,7 +28,7 @@ from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
 from per_obspy.tables.parts import write_part
 
-#: Rows of a chunk: a worker needs about 10 kB for each.
+#: Rows of a chunk at most: a worker needs about 10 kB for each.
 CHUNK = 100_000
 
 

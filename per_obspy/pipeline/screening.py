@@ -1,5 +1,6 @@
 """Second stage: pairs and the stations become the risk table, chunk by chunk."""
 
+import math
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,6 +29,13 @@ from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
+
+#: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
+CHUNKS_PER_WORKER = 4
+
+#: Rows of a chunk at least: preparing the records of 24 stations anew takes as long as 3 000 rows
+#: with estimates.
+SMALLEST_CHUNK = 10_000
 
 KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
@@ -194,8 +202,9 @@ def _parts(
     progress("screening", 0, inventory.count)
     # Rows are counted as chunks are finished, in whichever order
     parts, rows = list[Part](), 0
-    jobs = _jobs(settings, folder, ground, inventory)
-    for part in do_chunks(jobs, settings.workers or usable_processors(), executor):
+    workers = settings.workers or usable_processors()
+    jobs = _jobs(settings, folder, ground, inventory, _chunk_rows(inventory.count, workers))
+    for part in do_chunks(jobs, workers, executor):
         parts.append(part)
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
@@ -214,11 +223,22 @@ def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
             remove_file(path)
 
 
+def _chunk_rows(count: int, workers: int) -> int:
+    """
+    Return the rows of a chunk of an inventory of so many rows.
+
+    They are the smallest number times a power of two, so that finished chunks stay what they are
+    when an inventory grows a little.
+    """
+    share = max(count / (CHUNKS_PER_WORKER * workers), SMALLEST_CHUNK)
+    return min(SMALLEST_CHUNK << round(math.log2(share / SMALLEST_CHUNK)), CHUNK)
+
+
 def _jobs(
-    settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory
+    settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory, rows: int
 ) -> Iterator[ChunkJob]:
-    """Yield one job per chunk of the inventory."""
-    for number, chunk in enumerate(inventory.chunks(CHUNK)):
+    """Yield one job per chunk of so many rows of the inventory."""
+    for number, chunk in enumerate(inventory.chunks(rows)):
         part = _chunk_folder(folder) / f"{number:06}.parquet"
         yield ChunkJob(number, chunk, ground, settings.building, settings.screening, part)
 

@@ -13,6 +13,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
 from per_obspy.pipeline.results.shown_pair import find_pair
 from per_obspy.pipeline.run import report, run, screen
+from per_obspy.pipeline.screening import SMALLEST_CHUNK, _chunk_rows
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
@@ -85,6 +86,17 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     shutil.rmtree(copied / "out" / "chunks")
     assert screened(copied)["chunks"] == -(-60 // size)  # 61 lines, one of them no row
     assert results(copied) == before
+
+
+@pytest.mark.parametrize("workers", [1, 2, 8, 64])
+def test_chunks_are_small_enough_for_every_worker(workers):
+    # would catch an inventory in one chunk, on which one worker works while the others wait
+    for count in (1, 10_000, 30_000, 100_000, 1_000_000, 30_000_000):
+        rows = _chunk_rows(count, workers)
+        assert SMALLEST_CHUNK <= rows <= chunk.CHUNK
+        assert rows == SMALLEST_CHUNK or -(-count // rows) >= 2 * workers
+        # a few pairs more leave the finished chunks as they are
+        assert _chunk_rows(count + count // 100, workers) == rows
 
 
 def set_dataset(folder, pairs):

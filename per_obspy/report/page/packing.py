@@ -25,6 +25,9 @@ LONGEST_TEXT = 120
 #: Longest text of flags or columns of the package separated by blanks, characters.
 LONGEST_NAMES = 4_000
 
+#: Of deflate: the highest, 9, takes seven times as long and makes a page 1.4 % smaller.
+LEVEL = 6
+
 #: Largest number of different texts that are stored once each, with a number per row.
 MOST_CHOICES = 65_536
 
@@ -161,4 +164,4 @@ def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
     """
     text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
     data = b"".join([len(text).to_bytes(4, "little"), text, *(table.data for table in tables)])
-    return b64encode(zlib.compress(data, 9)).decode("ascii")
+    return b64encode(zlib.compress(data, LEVEL)).decode("ascii")
