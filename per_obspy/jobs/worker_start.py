@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
 
 #: Modules that load everything that a job needs.
-LOADED = ("per_obspy.jobs.station", "per_obspy.jobs.chunk", "per_obspy.jobs.building_rows")
+LOADED = (
+    "per_obspy.jobs.station",
+    "per_obspy.jobs.chunk",
+    "per_obspy.jobs.building_rows",
+    "obspy.taup",
+)
 
 #: Whether workers of this process are forks of its server.
 _forks = {"workers": False}

@@ -3,16 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from statistics import median
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
-from obspy.taup import TauPyModel
 
 from per_obspy.processing.noise.onset import picked_onset
 from per_obspy.processing.notes import copied, noted
 from per_obspy.processing.station.components import is_horizontal
+
+if TYPE_CHECKING:
+    from obspy.taup import TauPyModel
 
 #: Velocity model of the Earth for travel times.
 MODEL = "iasp91"
@@ -98,8 +100,11 @@ def _rounded(time: UTCDateTime | None) -> UTCDateTime | None:
 
 
 @lru_cache(maxsize=1)
-def _model() -> TauPyModel:
+def _model() -> "TauPyModel":
     """Return the velocity model, loaded once."""
+    # ObsPy's travel times load Matplotlib too: a quarter of the time in which a worker begins
+    from obspy.taup import TauPyModel
+
     return TauPyModel(MODEL)
 
 
