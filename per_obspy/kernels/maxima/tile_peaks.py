@@ -9,7 +9,6 @@ matter are searched step by step; there the maxima are exact.
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.maxima.roots import raise_to_root
 from per_obspy.kernels.maxima.strided_samples import (
     DAMPING,
     DISPLACEMENT,
@@ -19,14 +18,11 @@ from per_obspy.kernels.maxima.strided_samples import (
     STEP,
     WEIGHTS,
 )
+from per_obspy.kernels.oscillator.stationary import raise_within_step
 from per_obspy.kernels.oscillator.within_step import (
-    LONGEST_SPAN,
-    largest_in_step,
-    may_vanish,
     radius_bound,
     rate_bounds,
     sags,
-    select_conditions,
     series_terms,
     slacks,
     workspace,
@@ -224,30 +220,13 @@ def _rerun(u, z, lane, table, motion):
 def _search_steps(motion, radius, rates, slack, damping, phase, work, best):
     """Raise the largest values to the stationary ones within the steps of a tile."""
     selected = np.zeros(4, np.bool_)
-    viscosity = 2.0 * damping
     terms = series_terms(phase)
-    sag = sags(rates, damping, phase)
-    is_short = phase <= LONGEST_SPAN
+    bounds = radius, rates, slack, sags(rates, damping, phase)
     for i in range(TILE):
         # Steps whose ends come close enough to the largest values
         u, z, u_end, z_end = motion[0, i], motion[1, i], motion[0, i + 1], motion[1, i + 1]
         is_larger = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > best[0]
         if is_larger or max(abs(u), abs(u_end)) + slack[1] > best[1]:
-            start = motion[2, i]
-            end = motion[2, i + 1]
-            ends = (u, z, start, u_end, z_end, end)
-            is_doubtful = False
-            # Short steps: the one root of 2 xi z + a, then that of z
-            if is_larger and may_vanish(viscosity * z + start, viscosity * z_end + end, sag[0]):
-                is_doubtful = not (
-                    is_short and raise_to_root(0, ends, rates, damping, phase, terms, work, best)
-                )
-            if may_vanish(z, z_end, sag[1]):
-                is_doubtful |= not (
-                    is_short and raise_to_root(1, ends, rates, damping, phase, terms, work, best)
-                )
-            # Long steps, and those that may have several roots: every stationary point
-            if is_doubtful and select_conditions(
-                u, z, start, u_end, z_end, end, damping, phase, radius, 4, best, selected
-            ):
-                largest_in_step(u, z, start, end, damping, phase, selected, work, best)
+            # The largest values inside them
+            ends = (u, z, motion[2, i], u_end, z_end, motion[2, i + 1])
+            raise_within_step(ends, bounds, damping, phase, terms, 4, selected, work, best)

@@ -12,11 +12,14 @@ import numpy as np
 
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.stationary import raise_within_step
 from per_obspy.kernels.oscillator.within_step import (
     largest_in_step,
     radius_bound,
     rate_bounds,
+    sags,
     select_conditions,
+    series_terms,
     slacks,
     step_velocity_bound,
     velocity_slack,
@@ -228,29 +231,29 @@ def search_tiles(
         _rerun(step_coefficients(1.0, damping, phase), motion)
         # Find the steps that may hold larger values
         _mark(motion, rates, damping, phase, quantities, current, marks)
-        for i in range(TILE):
-            if marks[i] > 0.0:
-                # Search their stationary points
-                u, z, start = motion[0, i], motion[1, i], motion[2, i]
-                u_end, z_end, end = motion[0, i + 1], motion[1, i + 1], motion[2, i + 1]
-                if select_conditions(
-                    u,
-                    z,
-                    start,
-                    u_end,
-                    z_end,
-                    end,
-                    damping,
-                    phase,
-                    radius,
-                    quantities,
-                    current,
-                    selected,
-                ):
-                    largest_in_step(u, z, start, end, damping, phase, selected, work, current)
+        bounds = radius, rates, slacks(rates, damping, phase), sags(rates, damping, phase)
+        _search_steps(motion, marks, bounds, damping, phase, quantities, work, selected, current)
         # Infinity marks values that this tile cannot raise
         for row in range(quantities):
             largest[row, lane] = current[row] if current[row] < np.inf else largest[row, lane]
+
+
+@kernel
+def _search_steps(motion, marks, bounds, damping, phase, quantities, work, selected, current):
+    """Raise the largest values to those at the stationary points of the marked steps."""
+    terms = series_terms(phase)
+    for i in range(TILE):
+        if marks[i] <= 0.0:
+            continue
+        # State and acceleration before and after the step
+        u, z, start = motion[0, i], motion[1, i], motion[2, i]
+        u_end, z_end, end = motion[0, i + 1], motion[1, i + 1], motion[2, i + 1]
+        ends = (u, z, start, u_end, z_end, end)
+        # The radius alone mostly has one root per step
+        if quantities == 1:
+            raise_within_step(ends, bounds, damping, phase, terms, 1, selected, work, current)
+        elif select_conditions(*ends, damping, phase, bounds[0], quantities, current, selected):
+            largest_in_step(u, z, start, end, damping, phase, selected, work, current)
 
 
 @kernel

@@ -1,19 +1,69 @@
 r"""
-The stationary value within one step where its condition is monotone, from the root of a cubic.
+Stationary radius and displacement within one step, where possible from the root of a cubic.
 
 The displacement is stationary where ``z = 0``, the squared radius also where ``2 xi z + a = 0``. A
 condition whose slope at one end exceeds its largest change over the step has one root at most,
 which lies close to that of the cubic with the same values and slopes at both ends; Newton's method
 on the series corrects it. At a stationary point a small shift changes the value by its square.
+Other steps are searched for every root.
 """
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.oscillator.within_step import derivative, fill_series
+from per_obspy.kernels.oscillator.within_step import (
+    LONGEST_SPAN,
+    derivative,
+    fill_series,
+    largest_in_step,
+    may_vanish,
+    select_conditions,
+)
 
 #: Newton steps on the cubic, and on the series at most.
 CUBIC_STEPS, SERIES_STEPS = 2, 4
 #: Shift of a root, in phase, whose third power is rounding.
 SMALL_SHIFT = 1e-5
+
+
+@kernel
+def raise_within_step(ends, bounds, damping, phase, terms, quantities, selected, work, best):
+    """
+    Raise the largest values to those at the stationary points of radius and displacement in a step.
+
+    Parameters
+    ----------
+    ends : tuple of float
+        u, z and the acceleration before and after the step.
+    bounds : tuple
+        Of the step's tile, from `within_step`: radius, rates, slacks and sags.
+    damping, phase : float
+        Fraction of critical; phase ``omega * dt`` of the step, rad.
+    terms : int
+        Of the series of a step, from `within_step.series_terms`.
+    quantities : int
+        1 if only the squared radius counts, else 4.
+    selected, work, best : (4,) ndarray of bool, ndarray from `within_step.workspace`, (4,) ndarray
+        Room; largest values so far, infinite where a quantity does not count, raised in place.
+    """
+    u, z, start, u_end, z_end, end = ends
+    radius, rates, slack, sag = bounds
+    viscosity = 2.0 * damping
+    is_short = phase <= LONGEST_SPAN
+    is_doubtful = False
+    # Short steps: the one root of 2 xi z + a, then that of z
+    is_larger = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > best[0]
+    if is_larger and may_vanish(viscosity * z + start, viscosity * z_end + end, sag[0]):
+        is_doubtful = not (
+            is_short and raise_to_root(0, ends, rates, damping, phase, terms, work, best)
+        )
+    if may_vanish(z, z_end, sag[1]):
+        is_doubtful |= not (
+            is_short and raise_to_root(1, ends, rates, damping, phase, terms, work, best)
+        )
+    # Long steps, and those that may have several roots: every stationary point
+    if is_doubtful and select_conditions(
+        u, z, start, u_end, z_end, end, damping, phase, radius, quantities, best, selected
+    ):
+        largest_in_step(u, z, start, end, damping, phase, selected, work, best)
 
 
 @kernel

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.maxima.roots import raise_to_root
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.stationary import raise_to_root
 from per_obspy.kernels.oscillator.within_step import (
     largest_in_step,
     rate_bounds,
