@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
-from per_obspy.errors import Unfinished
+from per_obspy.errors import Unfinished, WriteError
 from per_obspy.jobs.parallel import Work, results
+from per_obspy.kernels._jit import can_be_stored
 from per_obspy.progress import Progress
 from per_obspy.screening.warmup import PARTS, compile_part
 from per_obspy.threads import usable_processors
@@ -27,9 +28,14 @@ def compile_kernels(progress: Progress) -> None:
 
     Raises
     ------
+    WriteError
+        If there is no folder in which they can be stored: every start would compile them again.
     Unfinished
         If a part cannot be compiled.
     """
+    if not can_be_stored():
+        reason = "set NUMBA_CACHE_DIR to a folder that can be written"
+        raise WriteError("compiled kernels", reason)
     total = len({*PARTS, *LAST})
     progress(COMPILING, 0, total)
     for done, _ in enumerate(_compiled(), start=1):

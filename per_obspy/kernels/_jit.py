@@ -39,6 +39,10 @@ OPTIONS: dict[str, Any] = {
 }
 
 
+#: Part of Numba's error where no folder can be written.
+NO_FOLDER = "no locator available"
+
+
 class SharedCache(FunctionCache):
     """Compiled code of one kernel on disk, which several processes may save at the same time."""
 
@@ -49,6 +53,17 @@ class SharedCache(FunctionCache):
             self._impl.locator.ensure_cache_path()
             with FileLock(str(Path(self.cache_path) / ".lock")):
                 super().save_overload(sig, data)
+
+
+def can_be_stored() -> bool:
+    """Return whether there is a folder in which compiled kernels can be stored."""
+    try:
+        SharedCache(can_be_stored)
+    except RuntimeError as error:
+        if NO_FOLDER not in str(error):
+            raise
+        return False
+    return True
 
 
 def _compiler(
@@ -65,7 +80,7 @@ def _compiler(
             kernel._cache = SharedCache(function)
         except RuntimeError as error:
             # Neither the package's folder nor that of the user can be written
-            if "no locator available" not in str(error):
+            if NO_FOLDER not in str(error):
                 raise
             _warn_without_cache()
             kernel = numba.njit(**(OPTIONS | {"cache": False}), **options)(function)

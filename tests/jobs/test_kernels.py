@@ -8,6 +8,7 @@ from numba import config
 
 from per_obspy.errors import Unfinished
 from per_obspy.jobs import kernels, worker_start
+from per_obspy.kernels import _jit
 
 #: A part that compiles one small kernel instead of many large ones.
 SMALL_PART = """
@@ -62,3 +63,15 @@ def test_a_part_that_fails_is_named(monkeypatch):
     monkeypatch.setattr(kernels, "usable_processors", lambda: 1)
     with pytest.raises(Unfinished, match=r"rows cannot be compiled: .*no room"):
         kernels.compile_kernels(lambda *_: None)
+
+
+def test_kernels_that_cannot_be_stored_are_refused(call, monkeypatch):
+    # catches an image whose kernels every start compiles again, although its warm-up succeeded
+    def no_folder(function):
+        raise RuntimeError(f"cannot cache function {function.__name__!r}: no locator available")
+
+    monkeypatch.setattr(_jit, "SharedCache", no_folder)
+    code, out, err = call("warm-up")
+    assert code == 75
+    assert not out
+    assert "compiled kernels: cannot be written: set NUMBA_CACHE_DIR" in err
