@@ -61,7 +61,10 @@ AXIS_COSINE, AXIS_SINE = 70, 71
 CONTACT_FUNCTION = 72
 #: rounding of the contact function over displacement; its least value at the samples of the tile
 CONTACT_ROUNDING, TILE_CONTACT = 77, 78
-LANE_ROWS = 79
+#: least velocity over omega of both structures towards the side that yields, at every
+#: UNROLLED_STEPS-th sample of the tile or more
+TILE_SPEED = 79
+LANE_ROWS = 81
 
 
 @lean
@@ -118,8 +121,32 @@ def start_tile(lanes, north, east):
 
 
 @lean
-def step_structure(lanes, first, lane, u, z, high, low, radius_squared, ground, next_ground):
+def load_structure(lanes, first, lane):
+    """Return displacement, velocity and extremes in the tile of a structure."""
+    return (
+        lanes[at(first + DISPLACEMENT, lane)],
+        lanes[at(first + VELOCITY, lane)],
+        lanes[at(first + TILE_HIGH, lane)],
+        lanes[at(first + TILE_LOW, lane)],
+        lanes[at(first + TILE_RADIUS_SQUARED, lane)],
+    )
+
+
+@lean
+def store_structure(lanes, first, lane, motion):
+    """Store displacement, velocity and extremes in the tile of a structure."""
+    u, z, high, low, radius_squared = motion
+    lanes[at(first + DISPLACEMENT, lane)] = u
+    lanes[at(first + VELOCITY, lane)] = z
+    lanes[at(first + TILE_HIGH, lane)] = high
+    lanes[at(first + TILE_LOW, lane)] = low
+    lanes[at(first + TILE_RADIUS_SQUARED, lane)] = radius_squared
+
+
+@lean
+def step_structure(lanes, first, lane, motion, ground, next_ground):
     """Return displacement, velocity and extremes of a structure after a step."""
+    u, z, high, low, radius_squared = motion
     after = step_value(lanes, first + STEP_DISPLACEMENT, lane, u, z, ground, next_ground)
     z = step_value(lanes, first + STEP_VELOCITY, lane, u, z, ground, next_ground)
     return after, z, max(high, after), min(low, after), max(radius_squared, after * after + z * z)
@@ -130,44 +157,18 @@ def advance_one_step(lanes, n0, e0, n1, e1):
     """Step every lane from one north and east acceleration to the next."""
     second = STRUCTURE_ROWS
     for lane in range(PAIR_LANES):
-        # load direction and least contact function of the pair
+        # ground acceleration along the pair at both ends of the step
         cosine = lanes[at(AXIS_COSINE, lane)]
         sine = lanes[at(AXIS_SINE, lane)]
-        least = lanes[at(TILE_CONTACT, lane)]
-        # load states u, z (velocity over omega) and extremes of both structures
-        u1 = lanes[at(DISPLACEMENT, lane)]
-        z1 = lanes[at(VELOCITY, lane)]
-        u2 = lanes[at(second + DISPLACEMENT, lane)]
-        z2 = lanes[at(second + VELOCITY, lane)]
-        high_1 = lanes[at(TILE_HIGH, lane)]
-        low_1 = lanes[at(TILE_LOW, lane)]
-        squared_1 = lanes[at(TILE_RADIUS_SQUARED, lane)]
-        high_2 = lanes[at(second + TILE_HIGH, lane)]
-        low_2 = lanes[at(second + TILE_LOW, lane)]
-        squared_2 = lanes[at(second + TILE_RADIUS_SQUARED, lane)]
-        # ground acceleration along the pair at both ends of the step
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        # step
-        u1, z1, high_1, low_1, squared_1 = step_structure(
-            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
-        )
-        u2, z2, high_2, low_2, squared_2 = step_structure(
-            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
-        )
-        least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
-        # store
-        lanes[at(DISPLACEMENT, lane)] = u1
-        lanes[at(VELOCITY, lane)] = z1
-        lanes[at(second + DISPLACEMENT, lane)] = u2
-        lanes[at(second + VELOCITY, lane)] = z2
-        lanes[at(TILE_HIGH, lane)] = high_1
-        lanes[at(TILE_LOW, lane)] = low_1
-        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared_1
-        lanes[at(second + TILE_HIGH, lane)] = high_2
-        lanes[at(second + TILE_LOW, lane)] = low_2
-        lanes[at(second + TILE_RADIUS_SQUARED, lane)] = squared_2
-        lanes[at(TILE_CONTACT, lane)] = least
+        # states and extremes of both structures, and the least contact function
+        left = step_structure(lanes, 0, lane, load_structure(lanes, 0, lane), a0, a1)
+        right = step_structure(lanes, second, lane, load_structure(lanes, second, lane), a0, a1)
+        contact = contact_value(lanes, lane, left[0], right[0], left[1], a1)
+        lanes[at(TILE_CONTACT, lane)] = min(lanes[at(TILE_CONTACT, lane)], contact)
+        store_structure(lanes, 0, lane, left)
+        store_structure(lanes, second, lane, right)
 
 
 @vectorised
@@ -175,70 +176,66 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
     """Step every lane four times, without a store between the steps."""
     second = STRUCTURE_ROWS
     for lane in range(PAIR_LANES):
-        # load direction and least contact function of the pair
+        # load direction, least contact function, states and extremes of both structures
         cosine = lanes[at(AXIS_COSINE, lane)]
         sine = lanes[at(AXIS_SINE, lane)]
         least = lanes[at(TILE_CONTACT, lane)]
-        # load states u, z (velocity over omega) and extremes of both structures
-        u1 = lanes[at(DISPLACEMENT, lane)]
-        z1 = lanes[at(VELOCITY, lane)]
-        u2 = lanes[at(second + DISPLACEMENT, lane)]
-        z2 = lanes[at(second + VELOCITY, lane)]
-        high_1 = lanes[at(TILE_HIGH, lane)]
-        low_1 = lanes[at(TILE_LOW, lane)]
-        squared_1 = lanes[at(TILE_RADIUS_SQUARED, lane)]
-        high_2 = lanes[at(second + TILE_HIGH, lane)]
-        low_2 = lanes[at(second + TILE_LOW, lane)]
-        squared_2 = lanes[at(second + TILE_RADIUS_SQUARED, lane)]
+        left = load_structure(lanes, 0, lane)
+        right = load_structure(lanes, second, lane)
         # first step, from a0 to a1: ground accelerations along the pair
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        u1, z1, high_1, low_1, squared_1 = step_structure(
-            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
-        )
-        u2, z2, high_2, low_2, squared_2 = step_structure(
-            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
-        )
-        least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
+        left = step_structure(lanes, 0, lane, left, a0, a1)
+        right = step_structure(lanes, second, lane, right, a0, a1)
+        least = min(least, contact_value(lanes, lane, left[0], right[0], left[1], a1))
         # second step
         a2 = cosine * n2 + sine * e2
-        u1, z1, high_1, low_1, squared_1 = step_structure(
-            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a1, a2
-        )
-        u2, z2, high_2, low_2, squared_2 = step_structure(
-            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a1, a2
-        )
-        least = min(least, contact_value(lanes, lane, u1, u2, z1, a2))
+        left = step_structure(lanes, 0, lane, left, a1, a2)
+        right = step_structure(lanes, second, lane, right, a1, a2)
+        least = min(least, contact_value(lanes, lane, left[0], right[0], left[1], a2))
         # third step
         a3 = cosine * n3 + sine * e3
-        u1, z1, high_1, low_1, squared_1 = step_structure(
-            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a2, a3
-        )
-        u2, z2, high_2, low_2, squared_2 = step_structure(
-            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a2, a3
-        )
-        least = min(least, contact_value(lanes, lane, u1, u2, z1, a3))
+        left = step_structure(lanes, 0, lane, left, a2, a3)
+        right = step_structure(lanes, second, lane, right, a2, a3)
+        least = min(least, contact_value(lanes, lane, left[0], right[0], left[1], a3))
         # fourth step
         a4 = cosine * n4 + sine * e4
-        u1, z1, high_1, low_1, squared_1 = step_structure(
-            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a3, a4
-        )
-        u2, z2, high_2, low_2, squared_2 = step_structure(
-            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a3, a4
-        )
-        least = min(least, contact_value(lanes, lane, u1, u2, z1, a4))
+        left = step_structure(lanes, 0, lane, left, a3, a4)
+        right = step_structure(lanes, second, lane, right, a3, a4)
+        least = min(least, contact_value(lanes, lane, left[0], right[0], left[1], a4))
         # store
-        lanes[at(DISPLACEMENT, lane)] = u1
-        lanes[at(VELOCITY, lane)] = z1
-        lanes[at(second + DISPLACEMENT, lane)] = u2
-        lanes[at(second + VELOCITY, lane)] = z2
-        lanes[at(TILE_HIGH, lane)] = high_1
-        lanes[at(TILE_LOW, lane)] = low_1
-        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared_1
-        lanes[at(second + TILE_HIGH, lane)] = high_2
-        lanes[at(second + TILE_LOW, lane)] = low_2
-        lanes[at(second + TILE_RADIUS_SQUARED, lane)] = squared_2
+        store_structure(lanes, 0, lane, left)
+        store_structure(lanes, second, lane, right)
         lanes[at(TILE_CONTACT, lane)] = least
+
+
+@vectorised
+def lower_speeds(lanes, begins):
+    """Lower the least speeds towards the sides that yield to those now, or begin with them."""
+    for lane in range(PAIR_LANES):
+        for i in range(2):
+            first = i * STRUCTURE_ROWS
+            speed = lanes[at(first + YIELD_SIDE, lane)] * lanes[at(first + VELOCITY, lane)]
+            least = speed if begins else min(lanes[at(TILE_SPEED + i, lane)], speed)
+            lanes[at(TILE_SPEED + i, lane)] = least
+
+
+@vectorised
+def _flag_yielding(lanes, flags):
+    """Flag every lane in which a structure yields now."""
+    for lane in range(PAIR_LANES):
+        side = lanes[at(YIELD_SIDE, lane)]
+        other_side = lanes[at(STRUCTURE_ROWS + YIELD_SIDE, lane)]
+        flags[lane] = 1 if (side != 0.0) | (other_side != 0.0) else 0
+
+
+@lean
+def _sum_of(flags):
+    """Return the sum of the flags of all lanes."""
+    total = 0
+    for lane in range(PAIR_LANES):
+        total += flags[lane]
+    return total
 
 
 @vectorised
@@ -293,6 +290,20 @@ def flag_structures(lanes, flags, i, peak, jump):
         distance = max(high - centre, centre - low)
         yields = distance + error > lanes[at(first + YIELD_LIMIT, lane)]
         flags[lane] |= (PEAK_FLAGS[i] if rises else 0) | (EVENT_FLAG if yields else 0)
+
+
+@vectorised
+def flag_unloading(lanes, flags):
+    """Flag lanes in which a yielding structure may unload."""
+    # From the nearer of two samples UNROLLED_STEPS apart the velocity falls for half of these steps
+    # at most, in each by angle times the largest acceleration: less than four of its error bounds
+    for lane in range(PAIR_LANES):
+        for i in range(2):
+            first = i * STRUCTURE_ROWS
+            fall = 2.0 * UNROLLED_STEPS * lanes[at(first + TILE_VELOCITY_ERROR, lane)]
+            yields = lanes[at(first + YIELD_SIDE, lane)] != 0.0
+            unloads = yields & (lanes[at(TILE_SPEED + i, lane)] <= fall)
+            flags[lane] |= EVENT_FLAG if unloads else 0
 
 
 @vectorised
@@ -362,28 +373,28 @@ def sweep_tile(lanes, flags, ground, count):
         Sum of the flags.
     """
     start_tile(lanes, ground[0, 0], ground[1, 0])
+    _flag_yielding(lanes, flags)
+    yields = _sum_of(flags) > 0
+    if yields:
+        lower_speeds(lanes, True)
     # four steps at a time
     k = 0
     while k + UNROLLED_STEPS <= count:
-        n0 = ground[0, k]
-        n1 = ground[0, k + 1]
-        n2 = ground[0, k + 2]
-        n3 = ground[0, k + 3]
-        n4 = ground[0, k + 4]
-        e0 = ground[1, k]
-        e1 = ground[1, k + 1]
-        e2 = ground[1, k + 2]
-        e3 = ground[1, k + 3]
-        e4 = ground[1, k + 4]
+        n0, n1, n2, n3 = ground[0, k], ground[0, k + 1], ground[0, k + 2], ground[0, k + 3]
+        e0, e1, e2, e3 = ground[1, k], ground[1, k + 1], ground[1, k + 2], ground[1, k + 3]
+        n4, e4 = ground[0, k + 4], ground[1, k + 4]
         advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+        if yields:
+            lower_speeds(lanes, False)
         k += UNROLLED_STEPS
     # remaining steps
     while k < count:
         advance_one_step(lanes, ground[0, k], ground[1, k], ground[0, k + 1], ground[1, k + 1])
+        if yields:
+            lower_speeds(lanes, False)
         k += 1
     # flags
     flag_tile(lanes, flags, ground, count)
-    total = 0
-    for lane in range(PAIR_LANES):
-        total += flags[lane]
-    return total
+    if yields:
+        flag_unloading(lanes, flags)
+    return _sum_of(flags)

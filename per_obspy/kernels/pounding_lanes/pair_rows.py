@@ -188,23 +188,29 @@ def write_contact_function(pair, row, i, equation):
 
 
 @lean
-def write_phase(pair, row, duration):
+def write_branch(pair, row, i, duration):
     """
-    Write all numbers of a lane that depend on the phase of its pair.
+    Write all numbers of a lane that depend on the branch of structure i.
 
-    These are the coefficients of the step, elastic range, error bounds and contact function;
-    ``duration`` is that of a step, s.
+    These are the coefficients of the step, elastic range and error bounds; ``duration`` is that of
+    a step, s.
     """
+    write_step(pair, row, i, motion_equation(row, i), duration)
+    # elastic range, which a yielding structure cannot leave
+    first = i * STRUCTURE_ROWS
+    side = row[i, PHASE]
+    pair[first + YIELD_LIMIT] = row[i, YIELD] if side == 0 else math.inf
+    pair[first + YIELD_CENTRE] = row[i, PLASTIC]
+    pair[first + YIELD_SIDE] = side
+    write_error_bounds(pair, first)
+    fill_ramp_response(pair, row, i)
+
+
+@lean
+def write_phase(pair, row, duration):
+    """Write all numbers of a lane that depend on the phase of its pair: branches and contact."""
     for i in range(2):
-        write_step(pair, row, i, motion_equation(row, i), duration)
-        # elastic range; a yielding structure is always looked at
-        first = i * STRUCTURE_ROWS
-        side = row[i, PHASE]
-        pair[first + YIELD_LIMIT] = row[i, YIELD] if side == 0 else -math.inf
-        pair[first + YIELD_CENTRE] = row[i, PLASTIC]
-        pair[first + YIELD_SIDE] = side
-        write_error_bounds(pair, first)
-        fill_ramp_response(pair, row, i)
+        write_branch(pair, row, i, duration)
     # contact force from the structure that is no wall
     finite = 0 if row[0, MASS] < math.inf else 1
     write_contact_function(pair, row, finite, motion_equation(row, finite))
@@ -275,6 +281,7 @@ def rest_pair(pair):
         pair[first + MAXIMUM_SO_FAR] = math.inf
         pair[first + RADIUS_SQUARED_SO_FAR] = math.inf
         pair[first + YIELD_LIMIT] = math.inf
+        pair[first + YIELD_SIDE] = 0.0
     # the contact function is always 1
     for k in range(4):
         pair[CONTACT_FUNCTION + k] = 0.0

@@ -32,10 +32,13 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     STRUCTURE_ROWS,
     TILE_DISPLACEMENT_ERROR,
     TILE_STEPS,
+    UNROLLED_STEPS,
     VELOCITY_ERROR,
     advance_one_step,
     at,
     flag_tile,
+    flag_unloading,
+    lower_speeds,
     start_tile,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
@@ -53,6 +56,7 @@ from per_obspy.kernels.pounding_lanes.step_by_step import (
     state_at_tile_start,
     write_back,
 )
+from per_obspy.kernels.pounding_lanes.stiffness_changes import run_stiffness_changes
 
 #: Gap that no structure reaches, and relative displacement that none passes, m.
 UNREACHABLE = 1e12
@@ -96,11 +100,15 @@ def _sweep_tile(lanes, flags, ground, count):
     """Step every lane through a tile as if no event happened, and flag lanes where one may."""
     start_tile(lanes, ground[0, 0], ground[1, 0])
     _raise_tile_relative(lanes, True)
+    lower_speeds(lanes, True)
     # step by step: the relative displacement is needed at every sample
     for k in range(count):
         advance_one_step(lanes, ground[0, k], ground[1, k], ground[0, k + 1], ground[1, k + 1])
         _raise_tile_relative(lanes, False)
+        if (k + 1) % UNROLLED_STEPS == 0 or k + 1 == count:
+            lower_speeds(lanes, False)
     flag_tile(lanes, flags, ground, count)
+    flag_unloading(lanes, flags)
     _flag_relative(lanes, flags)
 
 
@@ -184,6 +192,22 @@ def _may_exceed_relative(pair, row, left, next_left, right, next_right):
 
 
 @lean
+def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, exceeds):
+    """Carry a pair through a step that may hold an event; return whether it got through."""
+    # yielding and unloading below the largest relative displacements
+    if not exceeds and run_stiffness_changes(
+        pair, row, left, right, next_left, next_right, segment, -row[1, OPENING], row[0, OPENING]
+    ):
+        return True
+    # the rest event by event
+    set_states(pair, left, right)
+    load_pair(pair, row)
+    is_through = _run_events(row, log, segment)
+    store_pair(pair, row, segment.duration)
+    return is_through
+
+
+@lean
 def _step_through_tile(pair, row, log, ground, count, duration):
     """Carry a pair through a tile that may hold an event; return whether it got through."""
     second = STRUCTURE_ROWS
@@ -199,17 +223,16 @@ def _step_through_tile(pair, row, log, ground, count, duration):
         next_left = state_after_step(pair, 0, left, ground_start, ground_end)
         next_right = state_after_step(pair, second, right, ground_start, ground_end)
         # events that the error bounds do not exclude
-        happens = _may_exceed_relative(pair, row, left, next_left, right, next_right)
-        if is_bilinear:
-            left_yields = may_yield(pair, 0, left, next_left)
-            happens |= left_yields | may_yield(pair, second, right, next_right)
-        if happens:
+        exceeds = _may_exceed_relative(pair, row, left, next_left, right, next_right)
+        yields = is_bilinear and (
+            may_yield(pair, 0, left, next_left) or may_yield(pair, second, right, next_right)
+        )
+        if exceeds | yields:
             # repeat the step with its events
-            set_states(pair, left, right)
-            load_pair(pair, row)
             segment = segment_of_step(row, ground_start, ground_end, duration)
-            is_through &= _run_events(row, log, segment)
-            store_pair(pair, row, duration)
+            is_through &= _repeat_step(
+                pair, row, log, left, right, next_left, next_right, segment, exceeds
+            )
             next_left = present_state(pair, 0, ground_end)
             next_right = present_state(pair, second, ground_end)
         else:

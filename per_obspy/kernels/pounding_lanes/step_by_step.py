@@ -2,8 +2,8 @@
 Scalar steps of one pair through a tile that may hold an event.
 
 Steps that certainly hold no event use the same formulas as ``lanes``; the others are repeated:
-single impacts by ``impact_steps``, and all else from event to event, by the code of single
-histories (``next_event``).
+single impacts by ``impact_steps``, yielding and unloading by ``stiffness_changes``, and all else
+from event to event, by the code of single histories (``next_event``).
 """
 
 import math
@@ -12,6 +12,7 @@ from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCE_LIMIT,
     BOUNCES,
+    GAP,
     IN_CONTACT,
     LARGEST_DISPLACEMENT,
     LARGEST_RADIUS_SQUARED,
@@ -50,6 +51,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     state_after_step,
 )
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, store_pair
+from per_obspy.kernels.pounding_lanes.stiffness_changes import run_stiffness_changes
 
 
 @inlined
@@ -111,8 +113,17 @@ def run_events(row, log, segment, elapsed):
 
 
 @lean
-def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, yields):
+def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, happens, yields):
     """Carry a pair through a step that may hold an event; return whether it got through."""
+    # yielding and unloading of a free pair that does not meet
+    if (
+        yields
+        and not (happens or row[0, IN_CONTACT])
+        and run_stiffness_changes(
+            pair, row, left, right, next_left, next_right, segment, -row[0, GAP], math.inf
+        )
+    ):
+        return True
     set_states(pair, left, right)
     row[0, BOUNCES] = 0.0
     elapsed = -1.0
@@ -179,7 +190,7 @@ def step_through_tile(pair, row, log, ground, count, duration):
             # repeat the step with its events
             segment = segment_of_step(row, ground_start, ground_end, duration)
             is_through &= _repeat_step(
-                pair, row, log, left, right, next_left, next_right, segment, yields
+                pair, row, log, left, right, next_left, next_right, segment, happens, yields
             )
             next_left = present_state(pair, 0, ground_end)
             next_right = present_state(pair, second, ground_end)

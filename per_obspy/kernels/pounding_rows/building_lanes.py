@@ -32,7 +32,9 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     at,
     flag_structures,
     ground_extremes,
+    load_structure,
     step_structure,
+    store_structure,
 )
 
 #: Displacements and velocities after each of the last four steps.
@@ -85,23 +87,10 @@ def advance_one_step(lanes, n0, e0, n1, e1):
         # ground acceleration along the row at both ends of the step
         cosine = lanes[at(AXIS_COSINE, lane)]
         sine = lanes[at(AXIS_SINE, lane)]
-        u, z, high, low, squared = step_structure(
-            lanes,
-            0,
-            lane,
-            lanes[at(DISPLACEMENT, lane)],
-            lanes[at(VELOCITY, lane)],
-            lanes[at(TILE_HIGH, lane)],
-            lanes[at(TILE_LOW, lane)],
-            lanes[at(TILE_RADIUS_SQUARED, lane)],
-            cosine * n0 + sine * e0,
-            cosine * n1 + sine * e1,
-        )
-        lanes[at(DISPLACEMENT, lane)] = u
-        lanes[at(VELOCITY, lane)] = z
-        lanes[at(TILE_HIGH, lane)] = high
-        lanes[at(TILE_LOW, lane)] = low
-        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared
+        a0 = cosine * n0 + sine * e0
+        a1 = cosine * n1 + sine * e1
+        motion = load_structure(lanes, 0, lane)
+        store_structure(lanes, 0, lane, step_structure(lanes, 0, lane, motion, a0, a1))
     for lane in range(PAIR_LANES):
         # least contact function
         ground = lanes[at(AXIS_COSINE, lane)] * n1 + lanes[at(AXIS_SINE, lane)] * e1
@@ -116,38 +105,30 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         # direction, state and extremes
         cosine = lanes[at(AXIS_COSINE, lane)]
         sine = lanes[at(AXIS_SINE, lane)]
-        u = lanes[at(DISPLACEMENT, lane)]
-        z = lanes[at(VELOCITY, lane)]
-        high = lanes[at(TILE_HIGH, lane)]
-        low = lanes[at(TILE_LOW, lane)]
-        squared = lanes[at(TILE_RADIUS_SQUARED, lane)]
+        motion = load_structure(lanes, 0, lane)
         # first step, from a0 to a1: ground accelerations along the row
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        u, z, high, low, squared = step_structure(lanes, 0, lane, u, z, high, low, squared, a0, a1)
-        lanes[at(STEPPED, lane)] = u
-        lanes[at(STEPPED_VELOCITY, lane)] = z
+        motion = step_structure(lanes, 0, lane, motion, a0, a1)
+        lanes[at(STEPPED, lane)] = motion[0]
+        lanes[at(STEPPED_VELOCITY, lane)] = motion[1]
         # second step
         a2 = cosine * n2 + sine * e2
-        u, z, high, low, squared = step_structure(lanes, 0, lane, u, z, high, low, squared, a1, a2)
-        lanes[at(STEPPED + 1, lane)] = u
-        lanes[at(STEPPED_VELOCITY + 1, lane)] = z
+        motion = step_structure(lanes, 0, lane, motion, a1, a2)
+        lanes[at(STEPPED + 1, lane)] = motion[0]
+        lanes[at(STEPPED_VELOCITY + 1, lane)] = motion[1]
         # third step
         a3 = cosine * n3 + sine * e3
-        u, z, high, low, squared = step_structure(lanes, 0, lane, u, z, high, low, squared, a2, a3)
-        lanes[at(STEPPED + 2, lane)] = u
-        lanes[at(STEPPED_VELOCITY + 2, lane)] = z
+        motion = step_structure(lanes, 0, lane, motion, a2, a3)
+        lanes[at(STEPPED + 2, lane)] = motion[0]
+        lanes[at(STEPPED_VELOCITY + 2, lane)] = motion[1]
         # fourth step
         a4 = cosine * n4 + sine * e4
-        u, z, high, low, squared = step_structure(lanes, 0, lane, u, z, high, low, squared, a3, a4)
-        lanes[at(STEPPED + 3, lane)] = u
-        lanes[at(STEPPED_VELOCITY + 3, lane)] = z
+        motion = step_structure(lanes, 0, lane, motion, a3, a4)
+        lanes[at(STEPPED + 3, lane)] = motion[0]
+        lanes[at(STEPPED_VELOCITY + 3, lane)] = motion[1]
         # store
-        lanes[at(DISPLACEMENT, lane)] = u
-        lanes[at(VELOCITY, lane)] = z
-        lanes[at(TILE_HIGH, lane)] = high
-        lanes[at(TILE_LOW, lane)] = low
-        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared
+        store_structure(lanes, 0, lane, motion)
     for lane in range(PAIR_LANES):
         # least contact function after these steps
         cosine = lanes[at(AXIS_COSINE, lane)]

@@ -1,14 +1,18 @@
 """Sweep of many pairs side by side, on inputs small enough for the interpreter."""
 
+import itertools
 import math
 
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 
 from per_obspy.kernels.oscillator.exact_step import unit_responses
+from per_obspy.kernels.pounding_events import motion
 from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.deferred_maxima import write_lane
 from per_obspy.kernels.pounding_lanes.lanes import sweep_tile
+from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair, write_constants, write_phase
 from per_obspy.pounding.history.pair_blocks import pair_table
 from per_obspy.pounding.history.tables import row_at_rest
@@ -22,10 +26,11 @@ LINEAR = {
 }  # fmt: skip
 
 
-def lane_of(fields, duration):
-    """Return the numbers of the lane of a pair at rest."""
+def lane_of(fields, duration, yielding=0.0):
+    """Return the numbers of the lane of a pair at rest, of which bilinear structures may yield."""
     table = pair_table({name: np.array([value]) for name, value in fields.items()})
     row = row_at_rest(table, np.array([[fields["gap"]]]), np.array([[0.5]]))[0]
+    row[:, motion.PHASE] = np.where(row[:, motion.YIELD] < math.inf, yielding, 0.0)
     # along the north component
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, duration)
@@ -106,3 +111,90 @@ def test_a_resting_lane_is_never_flagged():
         write_lane(table, lane, pair)
     ground = 100.0 * np.random.default_rng(0).normal(size=(2, lanes.TILE_STEPS + 1))
     assert sweep_tile(table, flags, ground, lanes.TILE_STEPS) == 0
+
+
+class TestYieldingLanes:
+    SIDE, DURATION = -1.0, 0.002
+
+    def swept(self, number, ground, speeds):
+        """Return the flags of yielding lanes that start with these speeds, and their pair."""
+        structure = {f"yield_displacement_{number}": 0.01, f"hardening_{number}": 0.1}
+        pair = lane_of({**LINEAR, "gap": 100.0, **structure}, self.DURATION, yielding=self.SIDE)
+        first = (number - 1) * lanes.STRUCTURE_ROWS
+        table, flags = empty_lanes()
+        # only yielding is looked for
+        for row in (lanes.MAXIMUM_SO_FAR, lanes.RADIUS_SQUARED_SO_FAR):
+            pair[row] = pair[lanes.STRUCTURE_ROWS + row] = math.inf
+        for lane in range(lanes.PAIR_LANES):
+            pair[first + lanes.DISPLACEMENT] = self.SIDE * 0.01
+            pair[first + lanes.VELOCITY] = self.SIDE * speeds[lane]
+            write_lane(table, lane, pair)
+        sweep_tile(table, flags, ground, lanes.TILE_STEPS)
+        return flags, pair
+
+    def least_speed(self, pair, first, speed, ground):
+        """Return the least speed of a structure in the tile, in eight parts of every step."""
+        fine = lane_of_parts(pair, first)
+        state = complete_state(fine, 0, self.SIDE * 0.01, self.SIDE * speed, ground[0, 0])
+        least = speed
+        for k in range(lanes.TILE_STEPS):
+            parts = np.linspace(ground[0, k], ground[0, k + 1], 9)
+            for before, after in itertools.pairwise(parts):
+                state = state_after_step(fine, 0, state, before, after)
+                least = min(least, self.SIDE * state[1])
+        return least
+
+    @pytest.mark.parametrize("number", [1, 2])
+    def test_a_lane_without_flag_does_not_unload(self, number):
+        # catches: a velocity at the start or the end of the tile only, one towards the wrong side,
+        # the other structure, the bound between the samples left out
+        random = np.random.default_rng(number)
+        speeds = np.geomspace(1e-4, 1.0, lanes.PAIR_LANES)
+        steady = 0
+        for _ in range(3):
+            ground = np.zeros((2, lanes.TILE_STEPS + 1))
+            ground[0] = 3.0 * random.normal(size=lanes.TILE_STEPS + 1)
+            flags, pair = self.swept(number, ground, speeds)
+            first = (number - 1) * lanes.STRUCTURE_ROWS
+            for lane in range(lanes.PAIR_LANES):
+                if not flags[lane] & lanes.EVENT_FLAG:
+                    steady += 1
+                    assert self.least_speed(pair, first, speeds[lane], ground) > 0.0
+        assert steady > 10  # or the flags would be of no use
+
+    @pytest.mark.parametrize("number", [1, 2])
+    @pytest.mark.parametrize("sample", [0, 6])
+    def test_a_velocity_that_dips_between_the_samples_is_flagged(self, number, sample):
+        # catches: the bound between the samples left out, or the velocity at the start
+        ground = np.zeros((2, lanes.TILE_STEPS + 1))
+        ground[0, sample] = 150.0 * self.SIDE
+        ground[0, sample + 1 :] = -400.0 * self.SIDE
+        speeds = np.geomspace(1e-4, 1.0, lanes.PAIR_LANES)
+        flags, pair = self.swept(number, ground, speeds)
+        first = (number - 1) * lanes.STRUCTURE_ROWS
+        dips = 0
+        for lane in range(lanes.PAIR_LANES):
+            if self.least_speed(pair, first, speeds[lane], ground) < 0.0:
+                dips += 1
+                assert flags[lane] & lanes.EVENT_FLAG
+        assert 0 < dips < lanes.PAIR_LANES
+
+    def test_a_resting_lane_has_no_flag(self):
+        # catches: a lane without pair that is flagged for its velocity, which is zero
+        pair = lane_of({**LINEAR, "yield_displacement_1": 0.01}, self.DURATION, yielding=self.SIDE)
+        rest_pair(pair)
+        table, flags = empty_lanes()
+        for lane in range(lanes.PAIR_LANES):
+            write_lane(table, lane, pair)
+        assert sweep_tile(table, flags, np.ones((2, lanes.TILE_STEPS + 1)), 5) == 0
+
+
+def lane_of_parts(pair, first):
+    """Return the numbers of a lane whose steps are eighths of those of a structure of another."""
+    fields = {**LINEAR, "gap": 100.0, "yield_displacement_1": 0.01, "hardening_1": 0.1}
+    fields |= {"yield_displacement_2": 0.01, "hardening_2": 0.1}
+    fine = lane_of(fields, 0.125 * TestYieldingLanes.DURATION, yielding=TestYieldingLanes.SIDE)
+    if first:
+        fine[: lanes.STRUCTURE_ROWS] = fine[lanes.STRUCTURE_ROWS : 2 * lanes.STRUCTURE_ROWS]
+    assert fine[lanes.OMEGA] == pair[first + lanes.OMEGA]
+    return fine
