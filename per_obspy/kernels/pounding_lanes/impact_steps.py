@@ -9,37 +9,46 @@ the step or from the last impact on, to the event code of single histories.
 import math
 
 from per_obspy.kernels._jit import inlined, lean
-from per_obspy.kernels.pounding_events.contact import apply_impact, resolve_contact
+from per_obspy.kernels.pounding_events.contact import (
+    apply_impact,
+    apply_unlogged,
+    never_counts,
+    resolve_contact,
+)
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCE_LIMIT,
     BOUNCES,
     STICKING_DELAY,
     STICKING_SPEED,
+    U,
     V,
 )
+from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.free_impacts import (
     CLOSES_NOW,
     CLOSES_ONCE,
     STAYS_OPEN,
-    UNCERTAIN,
-    locate_impact,
+    add_velocity,
+    locate_impact_from,
     opening_rate,
-    predict_clearance,
-    states_inside_step,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
+    ACCELERATION,
     DISPLACEMENT,
     OMEGA,
     STRUCTURE_ROWS,
     VELOCITY,
+    YIELD_LIMIT,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
-    complete_state,
     may_exceed_maxima,
     may_yield,
     raise_maxima_inside,
 )
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair
+
+#: Displacement and rate at the start of a step by a unit rate there.
+AT_START = (0.0, 1.0)
 
 
 @inlined
@@ -52,18 +61,28 @@ def set_states(pair, left, right):
 
 
 @inlined
-def _states_after_impact(pair, row, log, left, right, segment, elapsed):
-    """Apply an impact to a pair in these states, after a share of the step; return its states."""
-    # impact, on the row
-    set_states(pair, left, right)
-    load_pair(pair, row)
-    apply_impact(row, log, 0, segment.start + elapsed * segment.duration)
-    # states with the velocities after it
-    ground = segment.acceleration + elapsed * segment.slope * segment.duration
-    second = STRUCTURE_ROWS
-    hit_left = complete_state(pair, 0, left[0], row[0, V] / pair[OMEGA], ground)
-    hit_right = complete_state(pair, second, right[0], row[1, V] / pair[second + OMEGA], ground)
-    return hit_left, hit_right
+def _hit(pair, row, log, left, right, time):
+    """Apply an impact to a pair in two states; return the changes of velocity over omega."""
+    omega = pair[OMEGA]
+    other_omega = pair[STRUCTURE_ROWS + OMEGA]
+    before = left[1] * omega
+    other_before = right[1] * other_omega
+    row[0, U] = left[0]
+    row[1, U] = right[0]
+    row[0, V] = before
+    row[1, V] = other_before
+    if never_counts(row, 0):
+        apply_unlogged(row, 0)
+    else:
+        apply_impact(row, log, 0, time)
+    return (row[0, V] - before) / omega, (row[1, V] - other_before) / other_omega
+
+
+@inlined
+def _faster(pair, first, state, growth):
+    """Return a state with so much more velocity."""
+    u, z, y = state
+    return u, z + growth, y + pair[first + ACCELERATION + 1] * growth
 
 
 @inlined
@@ -76,22 +95,40 @@ def _raise_both(pair, row, left, right, next_left, next_right, change, share):
 
 
 @inlined
-def next_impact(pair, row, left, right, next_left, next_right, share, segment):
+def _may_yield(pair, left, right, next_left, next_right):
+    """Return whether a structure may yield or unload in a piece; linear ones never do."""
+    if min(pair[YIELD_LIMIT], pair[STRUCTURE_ROWS + YIELD_LIMIT]) == math.inf:
+        return False
+    other_yields = may_yield(pair, STRUCTURE_ROWS, right, next_right)
+    return may_yield(pair, 0, left, next_left) | other_yields
+
+
+@inlined
+def next_impact(pair, row, ends, origin, other_origin, elapsed, segment, has_met):
     """
     Return the time until the impact in a piece, as a share of the step, and both states then.
 
     The time is infinite, and the states are those at the end, if there is no impact; it is -1 if
-    that is uncertain.
+    that is uncertain. Also return the responses for ``add_velocity``; see ``locate_impact_from``.
+    If the pair ``has_met`` its clearance is zero at the start.
     """
-    prediction = predict_clearance(pair, left, right, next_left, next_right, share)
-    if may_yield(pair, 0, left, next_left) or may_yield(pair, STRUCTURE_ROWS, right, next_right):
-        prediction = UNCERTAIN
+    left, right, next_left, next_right = ends
+    remaining = 1.0 - elapsed
+    duration = segment.duration
+    if _may_yield(pair, left, right, next_left, next_right):
+        return -1.0, next_left, next_right, AT_START, AT_START
+    if stays_open(pair, left, right, next_left, next_right, remaining, duration, has_met):
+        return math.inf, next_left, next_right, AT_START, AT_START
     # one way out per prediction
-    if prediction == CLOSES_ONCE:
-        return locate_impact(pair, row, left, right, next_left, next_right, share, segment)
-    if prediction == CLOSES_NOW:
-        return 0.0, left, right
-    return math.inf if prediction == STAYS_OPEN else -1.0, next_left, next_right
+    course = clearance_course(pair, left, right, next_left, next_right, remaining, duration)
+    if course == CLOSES_ONCE:
+        return locate_impact_from(
+            pair, row, ends, origin, other_origin, elapsed, remaining, segment
+        )
+    if course == CLOSES_NOW and elapsed == 0.0:
+        return 0.0, left, right, AT_START, AT_START
+    time = math.inf if course == STAYS_OPEN else -1.0
+    return time, next_left, next_right, AT_START, AT_START
 
 
 @inlined
@@ -136,33 +173,50 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         Time up to which the step was carried out, s: its duration, when ``pair`` has the state;
         else that of the last impact, when ``row`` has it; or -1 if no impact was carried out.
     """
-    # times are shares of the step
+    # times are shares of the step; free motion from the origins leads through each piece
     elapsed = 0.0
     change = segment.slope * segment.duration
+    origin = left
+    other_origin = right
+    has_met = False
     while True:
         remaining = 1.0 - elapsed
-        share, next_left, next_right = next_impact(
-            pair, row, left, right, next_left, next_right, remaining, segment
+        ends = left, right, next_left, next_right
+        share, hit_left, hit_right, response, other_response = next_impact(
+            pair, row, ends, origin, other_origin, elapsed, segment, has_met
         )
         # uncertain, or an impact without approach: left to the event code
         if share < 0.0 or (
-            share <= remaining
-            and opening_rate(pair, next_left, next_right) >= -row[0, STICKING_SPEED]
+            share <= remaining and opening_rate(pair, hit_left, hit_right) >= -row[0, STICKING_SPEED]
         ):
             break
-        _raise_both(pair, row, left, right, next_left, next_right, change, min(share, remaining))
+        _raise_both(pair, row, left, right, hit_left, hit_right, change, min(share, remaining))
         # no further impact: the end of the step
         if share > remaining:
             set_states(pair, next_left, next_right)
             return segment.duration
-        # the impact, and the states at the end of the step after it
+        # the impact
         elapsed += share
-        left, right = _states_after_impact(pair, row, log, next_left, next_right, segment, elapsed)
+        has_met = True
+        time = segment.start + elapsed * segment.duration
+        growth, other_growth = _hit(pair, row, log, hit_left, hit_right, time)
+        left = _faster(pair, 0, hit_left, growth)
+        right = _faster(pair, STRUCTURE_ROWS, hit_right, other_growth)
         if _bounces_end(pair, row, left, right):
             break
-        next_left, next_right = states_inside_step(pair, row, left, right, change, 1.0 - elapsed)
-    if row[0, BOUNCES] == 0.0:
+        # the step after it
+        origin, next_left = add_velocity(pair, 0, origin, next_left, response, growth)
+        other_origin, next_right = add_velocity(
+            pair, STRUCTURE_ROWS, other_origin, next_right, other_response, other_growth
+        )
+    if not has_met:
         return -1.0
-    # the row stays at the last impact
+    # the row stays at the last impact, with the velocities that it has
+    velocity = row[0, V]
+    other_velocity = row[1, V]
+    set_states(pair, left, right)
+    load_pair(pair, row)
+    row[0, V] = velocity
+    row[1, V] = other_velocity
     resolve_contact(row, log, segment, elapsed * segment.duration, 0)
     return elapsed * segment.duration

@@ -19,7 +19,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     state_after_step,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import segment_of_step
-from per_obspy.kernels.pounding_rows.clearance_bounds import stays_open
+from per_obspy.kernels.pounding_lanes.clearance_bounds import stays_open
 from per_obspy.kernels.pounding_rows.member_phases import load_row
 from per_obspy.kernels.pounding_rows.row_impacts import (
     END,
