@@ -61,7 +61,9 @@ AXIS_COSINE, AXIS_SINE = 70, 71
 CONTACT_FUNCTION = 72
 #: rounding of the contact function over displacement; its least value at the samples of the tile
 CONTACT_ROUNDING, TILE_CONTACT = 77, 78
-LANE_ROWS = 79
+#: 1 while coefficients of the line of a pair are not in its lane yet, else 0 (only in the line)
+IS_CHANGED = 79
+LANE_ROWS = 80
 
 
 @lean

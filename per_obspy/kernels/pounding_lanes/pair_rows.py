@@ -44,6 +44,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_ROUNDING,
     DISPLACEMENT,
     DISPLACEMENT_ERROR,
+    IS_CHANGED,
     MAXIMUM_SO_FAR,
     OMEGA,
     POWER_ERROR,
@@ -85,6 +86,7 @@ def write_step(pair, row, i, equation, duration):
     damping, stiffness, drive, constant = equation
     first = i * STRUCTURE_ROWS
     omega = math.sqrt(row[i, STIFFNESS])
+    pair[IS_CHANGED] = 1.0
     # responses of its phase; a touching pair has its own, for which TAYLOR is free between events
     if row[0, IN_CONTACT]:
         responses = TAYLOR
