@@ -119,25 +119,6 @@ def apply_impact(row, log, j, time):
     row[0, BOUNCES] += 1.0
 
 
-@lean
-def never_counts(row, j):
-    """Return whether an impact is too slow to count, whatever the fastest of its interface is."""
-    limit = max(SLOWEST_COUNTED, COUNTED_SHARE * row[j, APPROACH])
-    return row[j, V] - row[j + 1, V] <= limit
-
-
-@lean
-def apply_unlogged(row, j):
-    """Apply one impact as ``apply_impact``, without a line of the log and without energies."""
-    approach = row[j, V] - row[j + 1, V]
-    # velocities after the impact, (7) and (8)
-    change = (1.0 + row[j, RESTITUTION]) * approach
-    row[j, V] -= change * mass_share(row, j, j + 1, j + 1)
-    row[j + 1, V] += change * mass_share(row, j, j + 1, j)
-    row[j, APPROACH] = max(row[j, APPROACH], approach)
-    row[0, BOUNCES] += 1.0
-
-
 @kernel
 def count_impacts(rows, logs):
     """

@@ -187,9 +187,9 @@ def add_velocity(pair, first, origin, end, response, growth):
     value, rate = response
     # changes of displacement and velocity at the start
     by_displacement = rate + damping * value
-    factor = growth / (by_displacement * rate + stiffness * value * value)
-    u = -angle * value * factor
-    z = by_displacement * factor
+    inverse = 1.0 / (by_displacement * rate + stiffness * value * value)
+    u = -angle * value * inverse * growth
+    z = by_displacement * inverse * growth
     # and at the end
     row = first + STEP_DISPLACEMENT
     next_u = pair[row] * u + pair[row + 1] * z
@@ -237,12 +237,32 @@ def _improved_guess(series, end, share, time):
     value, slope, bend, twist = series
     reached = value + share * (slope + share * (bend + share * twist))
     fourth = (end - reached) / (share * share * share * share)
-    # quartic, its first and half its second derivative
     here = value + time * (slope + time * (bend + time * (twist + time * fourth)))
     inverse = 1.0 / (slope + time * (2.0 * bend + time * (3.0 * twist + time * 4.0 * fourth)))
     bend_here = bend + time * (3.0 * twist + time * 6.0 * fourth)
     step = -here * inverse
     better = time + step - step * step * bend_here * inverse
+    return better if 0.0 < better < share else time
+
+
+@inlined
+def _guess_after_contact(series, end, share):
+    """
+    Return an estimate of where a clearance that is zero at the start falls through zero again.
+
+    By the root of the parabola, and Newton's step with curvature from there, both on the
+    polynomials of ``_improved_guess`` over the time.
+    """
+    _, slope, bend, twist = series
+    # parabola
+    last = end / share
+    time = slope * share / (slope - last)
+    # cubic with this value at the end
+    fourth = (last - slope - share * (bend + share * twist)) / (share * share * share)
+    here = slope + time * (bend + time * (twist + time * fourth))
+    inverse = 1.0 / (bend + time * (2.0 * twist + time * 3.0 * fourth))
+    step = -here * inverse
+    better = time + step - step * step * (twist + time * 3.0 * fourth) * inverse
     return better if 0.0 < better < share else time
 
 
@@ -255,19 +275,19 @@ def locate_impact(pair, row, left, right, next_left, next_right, share, segment)
     """
     ends = left, right, next_left, next_right
     time, hit_left, hit_right, _, _ = locate_impact_from(
-        pair, row, ends, left, right, 0.0, share, segment
+        pair, row, ends, left, right, 0.0, share, segment, False
     )
     return time, hit_left, hit_right
 
 
 @lean
-def locate_impact_from(pair, row, ends, origin, other_origin, elapsed, share, segment):
+def locate_impact_from(pair, row, ends, origin, other_origin, elapsed, share, segment, has_met):
     """
     Return the time until the impact in a piece whose clearance closes once, and both states then.
 
     The time is a share of the step, as is the piece; ``ends`` are the states of both structures at
     its start, then at its end. It begins a share ``elapsed`` after the states from which free
-    motion leads through it. The time is corrected by the cubic of the clearance at the last
+    motion leads through it; if the pair ``has_met`` its clearance is zero then. The time is corrected by the cubic of the clearance at the last
     estimate until that is exact; it is -1 if this does not end, or leaves the piece.
 
     Also return ``_velocity_response`` of both structures then, since these states.
@@ -276,11 +296,14 @@ def locate_impact_from(pair, row, ends, origin, other_origin, elapsed, share, se
     second = STRUCTURE_ROWS
     duration = segment.duration
     change = segment.slope * duration
-    # first estimate: parabola through both ends, then the quartic
+    # first estimate
     series, _ = _clearance_series(pair, left, right, change, duration)
     end = _clearance(pair, next_left, next_right)
-    time = share * _first_guess(series[0], series[1] * share, end)
-    time = _improved_guess(series, end, share, time)
+    if has_met:
+        time = _guess_after_contact(series, end, share)
+    else:
+        time = share * _first_guess(series[0], series[1] * share, end)
+        time = _improved_guess(series, end, share, time)
     for _ in range(MOST_CORRECTIONS):
         # states at the estimate, and Taylor coefficients of the clearance from there
         now = elapsed + time

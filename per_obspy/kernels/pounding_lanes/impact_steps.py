@@ -10,18 +10,17 @@ import math
 
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
+    SLOWEST_COUNTED,
     apply_impact,
-    apply_unlogged,
-    never_counts,
     resolve_contact,
 )
 from per_obspy.kernels.pounding_events.motion import (
+    APPROACH,
     BOUNCE_LIMIT,
     BOUNCES,
     STICKING_DELAY,
     STICKING_SPEED,
-    U,
-    V,
 )
 from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.free_impacts import (
@@ -35,6 +34,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
 from per_obspy.kernels.pounding_lanes.lanes import (
     ACCELERATION,
     DISPLACEMENT,
+    IMPACT_GROWTH,
     OMEGA,
     STRUCTURE_ROWS,
     VELOCITY,
@@ -61,21 +61,15 @@ def set_states(pair, left, right):
 
 
 @inlined
-def _hit(pair, row, log, left, right, time):
-    """Apply an impact to a pair in two states; return the changes of velocity over omega."""
-    omega = pair[OMEGA]
-    other_omega = pair[STRUCTURE_ROWS + OMEGA]
-    before = left[1] * omega
-    other_before = right[1] * other_omega
-    row[0, U] = left[0]
-    row[1, U] = right[0]
-    row[0, V] = before
-    row[1, V] = other_before
-    if never_counts(row, 0):
-        apply_unlogged(row, 0)
-    else:
+def _note_impact(pair, row, log, left, right, approach, time):
+    """Note an impact of a pair in two states: a line of the log only if it may count."""
+    if approach > max(SLOWEST_COUNTED, COUNTED_SHARE * row[0, APPROACH]):
+        set_states(pair, left, right)
+        load_pair(pair, row)
         apply_impact(row, log, 0, time)
-    return (row[0, V] - before) / omega, (row[1, V] - other_before) / other_omega
+    else:
+        row[0, APPROACH] = max(row[0, APPROACH], approach)
+        row[0, BOUNCES] += 1.0
 
 
 @inlined
@@ -123,7 +117,7 @@ def next_impact(pair, row, ends, origin, other_origin, elapsed, segment, has_met
     course = clearance_course(pair, left, right, next_left, next_right, remaining, duration)
     if course == CLOSES_ONCE:
         return locate_impact_from(
-            pair, row, ends, origin, other_origin, elapsed, remaining, segment
+            pair, row, ends, origin, other_origin, elapsed, remaining, segment, has_met
         )
     if course == CLOSES_NOW and elapsed == 0.0:
         return 0.0, left, right, AT_START, AT_START
@@ -198,8 +192,11 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         # the impact
         elapsed += share
         has_met = True
+        approach = -opening_rate(pair, hit_left, hit_right)
         time = segment.start + elapsed * segment.duration
-        growth, other_growth = _hit(pair, row, log, hit_left, hit_right, time)
+        _note_impact(pair, row, log, hit_left, hit_right, approach, time)
+        growth = pair[IMPACT_GROWTH] * approach
+        other_growth = pair[IMPACT_GROWTH + 1] * approach
         left = _faster(pair, 0, hit_left, growth)
         right = _faster(pair, STRUCTURE_ROWS, hit_right, other_growth)
         if _bounces_end(pair, row, left, right):
@@ -211,12 +208,8 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         )
     if not has_met:
         return -1.0
-    # the row stays at the last impact, with the velocities that it has
-    velocity = row[0, V]
-    other_velocity = row[1, V]
+    # the row stays at the last impact
     set_states(pair, left, right)
     load_pair(pair, row)
-    row[0, V] = velocity
-    row[1, V] = other_velocity
     resolve_contact(row, log, segment, elapsed * segment.duration, 0)
     return elapsed * segment.duration

@@ -61,9 +61,12 @@ AXIS_COSINE, AXIS_SINE = 70, 71
 CONTACT_FUNCTION = 72
 #: rounding of the contact function over displacement; its least value at the samples of the tile
 CONTACT_ROUNDING, TILE_CONTACT = 77, 78
-#: 1 while coefficients of the line of a pair are not in its lane yet, else 0 (only in the line)
-IS_CHANGED = 79
-LANE_ROWS = 80
+# only in the line of a pair, not in its lane
+#: growth of the velocity over omega of both structures in an impact, over its approach speed (s)
+IMPACT_GROWTH = 79
+#: 1 while coefficients of the line are not in the lane yet, else 0
+IS_CHANGED = 81
+LANE_ROWS = 82
 
 
 @lean

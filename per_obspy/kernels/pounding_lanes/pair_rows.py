@@ -22,6 +22,7 @@ from per_obspy.kernels.pounding_events.motion import (
     PHASE,
     PLASTIC,
     RAMP_RESPONSE,
+    RESTITUTION,
     STIFFNESS,
     TAYLOR,
     TERM_COUNT,
@@ -31,6 +32,7 @@ from per_obspy.kernels.pounding_events.motion import (
     V,
     cluster_equation,
     fill_taylor,
+    mass_share,
     restoring_force,
     taylor_terms,
 )
@@ -44,6 +46,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_ROUNDING,
     DISPLACEMENT,
     DISPLACEMENT_ERROR,
+    IMPACT_GROWTH,
     IS_CHANGED,
     MAXIMUM_SO_FAR,
     OMEGA,
@@ -229,6 +232,9 @@ def write_constants(pair, row, cosine, sine, duration):
         omega = math.sqrt(stiffness)
         pair[first + OMEGA] = omega
         pair[first + ANGLE] = omega * duration
+        # impact by (7) and (8): the other structure's share of the mass
+        change = (1.0 + row[0, RESTITUTION]) * mass_share(row, 0, 1, 1 - i)
+        pair[IMPACT_GROWTH + i] = (change if i else -change) / omega
 
 
 @lean
