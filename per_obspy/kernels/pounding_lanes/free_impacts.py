@@ -58,7 +58,7 @@ def _first_guess(start, slope, end):
 
 
 @inlined
-def _acceleration_rate(pair, first, state, change):
+def acceleration_rate(pair, first, state, change):
     """Return the rate of an acceleration per step, over which the ground changes by ``change``."""
     by_displacement = pair[first + ACCELERATION] * state[1]
     by_velocity = pair[first + ACCELERATION + 1] * state[2]
@@ -133,7 +133,7 @@ def _state_by_ramp(pair, first, start, change, share, ramp):
     """
     u, z, y = start
     angle = pair[first + ANGLE]
-    rate = _acceleration_rate(pair, first, start, change)
+    rate = acceleration_rate(pair, first, start, change)
     damping, stiffness = _equation(pair, first)
     response, response_rate = ramp
     # growth of displacement and velocity, and the acceleration
@@ -217,8 +217,8 @@ def _clearance_series(pair, left, right, change, duration):
     omega = pair[OMEGA] * duration
     other_omega = pair[second + OMEGA] * duration
     # rates of both accelerations, then the coefficients of their difference
-    rate = _acceleration_rate(pair, 0, left, change)
-    other_rate = _acceleration_rate(pair, second, right, change)
+    rate = acceleration_rate(pair, 0, left, change)
+    other_rate = acceleration_rate(pair, second, right, change)
     value = _clearance(pair, left, right)
     slope = other_omega * right[1] - omega * left[1]
     bend = 0.5 * (other_omega * other_omega * right[2] - omega * omega * left[2])

@@ -35,6 +35,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     YIELD_LIMIT,
     YIELD_SIDE,
 )
+from per_obspy.kernels.pounding_lanes.turning_points import turning_point
 
 
 @inlined
@@ -151,7 +152,14 @@ def raise_maxima_inside(pair, row, i, start, end, change, share):
     )
     widens = abs(u0 + u1 + y0 + y1) <= power_change + 2.0 * power_error
     widens &= radius * radius > row[i, LARGEST_RADIUS_SQUARED]
-    # maxima at these roots
+    # a displacement that turns once
+    if turns:
+        turn = turning_point(pair, row, i, start, end, change, share)
+        if not math.isnan(turn):
+            row[i, LARGEST_DISPLACEMENT] = max(row[i, LARGEST_DISPLACEMENT], abs(turn))
+            row[i, LARGEST_RADIUS_SQUARED] = max(row[i, LARGEST_RADIUS_SQUARED], turn * turn)
+            turns = False
+    # maxima at the other roots
     if turns | widens:
         fill_displacement_in_step(pair, row, 0, first, start, change)
     if turns:
