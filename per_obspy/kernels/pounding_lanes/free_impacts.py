@@ -78,15 +78,39 @@ def state_inside_step(pair, row, i, start, change, share):
 
 @inlined
 def _ramps(row, share):
-    """Return the ``_ramp`` of both structures: two series in one loop take less time."""
-    cubic = slope = other_cubic = other_slope = 0.0
-    # Horner's rule
-    for n in range(int(row[0, TERM_COUNT]) - 1, 2, -1):
-        slope = slope * share + cubic
-        cubic = cubic * share + row[0, RAMP_RESPONSE + n]
-        other_slope = other_slope * share + other_cubic
-        other_cubic = other_cubic * share + row[1, RAMP_RESPONSE + n]
-    return _ramp(share, cubic, slope), _ramp(share, other_cubic, other_slope)
+    """
+    Return the ``_ramp`` of both structures.
+
+    Their series are summed side by side, even and odd powers too: these sums of products do not
+    wait for each other.
+    """
+    square = share * share
+    even = even_rate = odd = odd_rate = 0.0
+    other_even = other_even_rate = other_odd = other_odd_rate = 0.0
+    n = RAMP_RESPONSE + int(row[0, TERM_COUNT]) - 1
+    # the last power of an odd number of terms
+    if (n - RAMP_RESPONSE) % 2 == 1:
+        even = row[0, n]
+        other_even = row[1, n]
+        n -= 1
+    # Horner's rule in the square of the time
+    while n > RAMP_RESPONSE + 3:
+        even_rate = even_rate * square + even
+        even = even * square + row[0, n - 1]
+        odd_rate = odd_rate * square + odd
+        odd = odd * square + row[0, n]
+        other_even_rate = other_even_rate * square + other_even
+        other_even = other_even * square + row[1, n - 1]
+        other_odd_rate = other_odd_rate * square + other_odd
+        other_odd = other_odd * square + row[1, n]
+        n -= 2
+    # value and rate of both series
+    rate = odd + 2.0 * share * (even_rate + share * odd_rate)
+    other_rate = other_odd + 2.0 * share * (other_even_rate + share * other_odd_rate)
+    return (
+        _ramp(share, even + share * odd, rate),
+        _ramp(share, other_even + share * other_odd, other_rate),
+    )
 
 
 @inlined
