@@ -182,6 +182,7 @@ def _near_response(pair, first, response, share):
     """Return the response to a unit rate a share of a step later, so near that it is cubic."""
     damping, stiffness = _equation(pair, first)
     value, rate = response
+    # by the equation of free vibration
     bend = -damping * rate - stiffness * value
     twist = -damping * bend - stiffness * rate
     value += share * (rate + share * (0.5 * bend + share * SIXTH * twist))
@@ -261,6 +262,7 @@ def _improved_guess(series, end, share, time):
     value, slope, bend, twist = series
     reached = value + share * (slope + share * (bend + share * twist))
     fourth = (end - reached) / (share * share * share * share)
+    # quartic, its first and half its second derivative
     here = value + time * (slope + time * (bend + time * (twist + time * fourth)))
     inverse = 1.0 / (slope + time * (2.0 * bend + time * (3.0 * twist + time * 4.0 * fourth)))
     bend_here = bend + time * (3.0 * twist + time * 6.0 * fourth)
@@ -311,8 +313,9 @@ def locate_impact_from(pair, row, ends, origin, other_origin, elapsed, share, se
 
     The time is a share of the step, as is the piece; ``ends`` are the states of both structures at
     its start, then at its end. It begins a share ``elapsed`` after the states from which free
-    motion leads through it; if the pair ``has_met`` its clearance is zero then. The time is corrected by the cubic of the clearance at the last
-    estimate until that is exact; it is -1 if this does not end, or leaves the piece.
+    motion leads through it; if the pair ``has_met`` its clearance is zero then. The time is
+    corrected by the cubic of the clearance at the last estimate until that is exact; it is -1 if
+    this does not end, or leaves the piece.
 
     Also return ``_velocity_response`` of both structures then, since these states.
     """

@@ -180,9 +180,8 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
             pair, row, ends, origin, other_origin, elapsed, segment, has_met
         )
         # uncertain, or an impact without approach: left to the event code
-        if share < 0.0 or (
-            share <= remaining and opening_rate(pair, hit_left, hit_right) >= -row[0, STICKING_SPEED]
-        ):
+        approach = -opening_rate(pair, hit_left, hit_right)
+        if share < 0.0 or (share <= remaining and approach <= row[0, STICKING_SPEED]):
             break
         _raise_both(pair, row, left, right, hit_left, hit_right, change, min(share, remaining))
         # no further impact: the end of the step
@@ -192,7 +191,6 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         # the impact
         elapsed += share
         has_met = True
-        approach = -opening_rate(pair, hit_left, hit_right)
         time = segment.start + elapsed * segment.duration
         _note_impact(pair, row, log, hit_left, hit_right, approach, time)
         growth = pair[IMPACT_GROWTH] * approach

@@ -93,7 +93,12 @@ def write_step(pair, row, i, equation, duration):
     # responses of its phase; a touching pair has its own, for which TAYLOR is free between events
     if row[0, IN_CONTACT]:
         responses = TAYLOR
-        fill_responses(row, i, responses, damping, stiffness, duration)
+        if i == 0:
+            fill_responses(row, 0, responses, damping, stiffness, duration)
+        else:
+            # both have one equation, and the first was written before
+            for k in range(6):
+                row[1, responses + k] = row[0, responses + k]
     else:
         responses = ELASTIC_RESPONSES if row[i, PHASE] == 0.0 else YIELDED_RESPONSES
     # displacement (k = 0) and velocity over omega (k = 1) after a step

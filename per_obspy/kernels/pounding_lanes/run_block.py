@@ -145,10 +145,11 @@ def run_block(record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine
         Deferred tiles of both structures; zero at the start.
     rows : (PAIR_LANES, 2, ROW_COLUMNS) ndarray
         Rows of structures of the pairs at rest, then at the end; see `motion` for the columns. They
-        hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and
-        APPROACH (m/s).
+        hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), APPROACH
+        (m/s) and IMPACTS, the lines of the log.
     logs : (PAIR_LANES, n_lines, LOG_COLUMNS) ndarray
-        Receive one line per impact as long as there is room; see `contact` for their columns.
+        Receive one line per impact that may count, as long as there is room; see `contact` for
+        their columns.
     cosine, sine : (PAIR_LANES,) ndarray
         Of the azimuth of the axis from structure 1 to 2.
     free_steps : (PAIR_LANES,) ndarray of int
@@ -173,7 +174,9 @@ def run_block(record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine
         is_through &= advance_block(
             lanes, flags, pairs, rows, logs, deferred, record, grounds, step, end
         )
-        active = retire_still_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, group)
+        active = retire_still_lanes(
+            lanes, pairs, rows, deferred, record, grounds, free_steps, group
+        )
     # free vibration, until every pair is settled
     elapsed = 0
     while retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):

@@ -207,6 +207,7 @@ def write_back(lanes, lane, pair, row):
     if pair[IS_CHANGED] != 0.0:
         pair[IS_CHANGED] = 0.0
         write_lane(lanes, lane, pair)
+    # state and maxima
     for i in range(2):
         first = i * STRUCTURE_ROWS
         lanes[at(first + DISPLACEMENT, lane)] = pair[first + DISPLACEMENT]

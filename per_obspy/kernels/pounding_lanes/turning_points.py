@@ -12,7 +12,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import acceleration_rate, sta
 from per_obspy.kernels.pounding_lanes.lanes import ACCELERATION_ERROR, ANGLE, STRUCTURE_ROWS
 
 #: Share of a step over which a cubic has the largest displacement but for rounding.
-NEAR = 1e-2
+NEAR = 3e-4
 #: Estimates of the time of a turning point, above which it is left to the polynomials.
 MOST_ESTIMATES = 4
 #: Of the third Taylor coefficient.

@@ -36,6 +36,7 @@ from per_obspy.kernels.pounding_events.motion import (
     mass_share,
 )
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
+from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.free_impacts import (
     CLOSES_NOW,
     CLOSES_ONCE,
@@ -58,7 +59,6 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     may_yield,
     raise_maxima_inside,
 )
-from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_rows.member_phases import update_phases
 from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 

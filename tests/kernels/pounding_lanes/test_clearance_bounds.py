@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.free_impacts import (
     CLOSES_NOW,
     CLOSES_ONCE,
@@ -17,7 +18,6 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
 from per_obspy.kernels.pounding_lanes.lanes import CONTACT_FUNCTION, LANE_ROWS
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state
 from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
-from per_obspy.kernels.pounding_lanes.clearance_bounds import clearance_course, stays_open
 
 STEP, COUNT = 0.02, 500
 #: Times at which the motion inside a piece is looked at, as shares of the piece.
