@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.motion import LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED
 from per_obspy.kernels.pounding_lanes.lanes import (
+    DISPLACEMENT,
     LANE_ROWS,
     MAXIMUM_SO_FAR,
     PAIR_LANES,
@@ -28,6 +29,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     TILE_RADIUS_SQUARED,
     TILE_RADIUS_SQUARED_BOUND,
     TILE_STEPS,
+    VELOCITY,
     at,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
@@ -89,6 +91,14 @@ def fill_ground(record, step, ground):
 
 
 @lean
+def read_states(lanes, lane, pair):
+    """Copy the states of a lane, now and at the start of the tile, to the line of its pair."""
+    for first in (0, STRUCTURE_ROWS):
+        for k in (DISPLACEMENT, VELOCITY, START_DISPLACEMENT, START_VELOCITY):
+            pair[first + k] = lanes[at(first + k, lane)]
+
+
+@lean
 def read_lane(lanes, lane, pair):
     """Copy the numbers of a lane to a line."""
     for k in range(LANE_ROWS):
@@ -114,13 +124,9 @@ def may_hold_maximum(deferred, row, i):
 @lean
 def search_deferred(lanes, lane, pair, row, deferred, record, ground):
     """Search the deferred tiles of a lane that may hold a maximum; no tile remains deferred."""
-    is_loaded = False
     for i in range(2):
         if may_hold_maximum(deferred, row, i):
-            # coefficients of the lane and ground motion of the tile
-            if not is_loaded:
-                read_lane(lanes, lane, pair)
-                is_loaded = True
+            # ground motion of the tile
             fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
             # maxima of the tile
             u = deferred[i, FIRST_DISPLACEMENT]

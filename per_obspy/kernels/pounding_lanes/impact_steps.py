@@ -1,45 +1,77 @@
-"""
+r"""
 Fast path for the steps of a free pair whose events are single impacts.
 
 It is used when the clearance closes once in the rest of a step, or not at all: most steps of a
 pounding pair that hold an event consist of such pieces. Everything else is left, from the start of
 the step or from the last impact on, to the event code of single histories.
+
+Bounds from the states at both ends of a piece decide whether it closes.
+The clearance f and its rate are known at both ends of a piece of length h, and so is its
+acceleration. Three bounds follow. With time as the angle ``omega t`` the acceleration y of a
+building leaves its chord over the piece by an eighth of the squared length times the largest
+``|y''|``, which is ``share * ACCELERATION_ERROR`` times its larger ``|y|`` at both ends at most,
+because the error of a step has one term that grows with its length and one with its square.
+
+* The cubic that has the values and rates of f at both ends leaves f by ``t² (h - t)² / 24`` times
+  the largest ``|f''''|`` at most, which is ``h⁴ / 384`` times it. As ``|y''|`` is 8 over the
+  squared length times its error, the part of a building is ``error angle² / 48`` times ``|y|``.
+  The cubic lies above the least of its four control points.
+* The acceleration of f leaves its chord by ``bend``, the sum of the errors of both buildings.
+* The rate of f leaves its chord by ``h / 8`` times the change of that acceleration over the piece,
+  which is what a linear acceleration causes, and by ``h / 2`` times ``bend``: with e the rest of
+  the acceleration, the rate of the rest is ``(1 - s) ∫ e`` up to s less ``s ∫ e`` after it, with s
+  the share of the piece, at most ``2 h s (1 - s) bend``.
 """
 
 import math
 
 from per_obspy.kernels._jit import inlined, lean
-from per_obspy.kernels.pounding_events.contact import apply_impact, resolve_contact
+from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
+    SLOWEST_COUNTED,
+    apply_impact,
+    resolve_contact,
+)
 from per_obspy.kernels.pounding_events.motion import (
+    APPROACH,
     BOUNCE_LIMIT,
     BOUNCES,
     STICKING_DELAY,
     STICKING_SPEED,
-    V,
 )
 from per_obspy.kernels.pounding_lanes.free_impacts import (
+    CLEARANCE_ROUNDING,
     CLOSES_NOW,
     CLOSES_ONCE,
     STAYS_OPEN,
     UNCERTAIN,
-    locate_impact,
+    add_velocity,
+    locate_impact_from,
     opening_rate,
-    predict_clearance,
-    states_inside_step,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
+    ACCELERATION,
+    ACCELERATION_ERROR,
+    ANGLE,
+    CONTACT_FUNCTION,
     DISPLACEMENT,
+    IMPACT_GROWTH,
     OMEGA,
     STRUCTURE_ROWS,
     VELOCITY,
+    YIELD_LIMIT,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
-    complete_state,
     may_exceed_maxima,
     may_yield,
     raise_maxima_inside,
 )
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair
+
+#: Displacement and rate at the start of a step by a unit rate there.
+AT_START = (0.0, 1.0)
+#: ``t² (h - t)² / 24`` over ``h⁴ / 384`` is at most this times ``t (h - t)² / h³``.
+ROOM_AFTER_CONTACT = 16.0
 
 
 @inlined
@@ -52,18 +84,122 @@ def set_states(pair, left, right):
 
 
 @inlined
-def _states_after_impact(pair, row, log, left, right, segment, elapsed):
-    """Apply an impact to a pair in these states, after a share of the step; return its states."""
-    # impact, on the row
-    set_states(pair, left, right)
-    load_pair(pair, row)
-    apply_impact(row, log, 0, segment.start + elapsed * segment.duration)
-    # states with the velocities after it
-    ground = segment.acceleration + elapsed * segment.slope * segment.duration
+def _ends(pair, left, right, next_left, next_right):
+    """Return the clearance of a pair, and the size of its terms, and its rate, at both ends."""
+    omega = pair[OMEGA]
+    other_omega = pair[STRUCTURE_ROWS + OMEGA]
+    gap = pair[CONTACT_FUNCTION + 4]
+    size = abs(left[0]) + abs(right[0]) + gap
+    # opening rates
+    rate = other_omega * right[1] - omega * left[1]
+    next_rate = other_omega * next_right[1] - omega * next_left[1]
+    return gap - left[0] + right[0], gap - next_left[0] + next_right[0], rate, next_rate, size
+
+
+@inlined
+def _errors(pair, left, right, next_left, next_right, share):
+    """Return both errors of ``y`` over the piece: those of the left and of the right building."""
     second = STRUCTURE_ROWS
-    hit_left = complete_state(pair, 0, left[0], row[0, V] / pair[OMEGA], ground)
-    hit_right = complete_state(pair, second, right[0], row[1, V] / pair[second + OMEGA], ground)
-    return hit_left, hit_right
+    strength = max(abs(left[2]), abs(next_left[2]))
+    other_strength = max(abs(right[2]), abs(next_right[2]))
+    error = share * pair[ACCELERATION_ERROR] * strength
+    return error, share * pair[second + ACCELERATION_ERROR] * other_strength
+
+
+@inlined
+def _stays_above(value, next_value, rate, next_rate, span, rest, rounding, has_met):
+    """
+    Return whether a function stays above a rounding, by its cubic over a span less a rest.
+
+    If it ``has_met`` it is zero at the start, and stays positive after it: there the rest is below
+    ``ROOM_AFTER_CONTACT`` times ``s (1 - s)² rest``, and the control point ``3 s (1 - s)² rate``.
+    """
+    if next_value <= rounding:
+        return False
+    third = span * (1.0 / 3.0)
+    near = third * rate
+    far = next_value - third * next_rate
+    if has_met:
+        return (3.0 * near > ROOM_AFTER_CONTACT * rest) & (min(near, far) > rounding)
+    return min(value, value + near, far, next_value) - rest > rounding
+
+
+@inlined
+def stays_open(pair, left, right, next_left, next_right, share, duration, has_met):
+    """
+    Return whether the clearance of an open interface certainly stays positive in a piece.
+
+    Parameters
+    ----------
+    pair : (LANE_ROWS,) ndarray
+        Numbers of the building before the interface, with those of the other as structure 2.
+    left, right, next_left, next_right : tuple of float
+        States of both buildings at the start and at the end of the piece.
+    share : float
+        Length of the piece over that of a step.
+    duration : float
+        Of a step, s.
+    has_met : bool
+        Whether the clearance is zero at the start.
+    """
+    value, next_value, rate, next_rate, size = _ends(pair, left, right, next_left, next_right)
+    # rest of the clearance beyond its cubic
+    error, other_error = _errors(pair, left, right, next_left, next_right, share)
+    angle = share * pair[ANGLE]
+    other_angle = share * pair[STRUCTURE_ROWS + ANGLE]
+    rest = (angle * angle * error + other_angle * other_angle * other_error) * (1.0 / 48.0)
+    rounding = CLEARANCE_ROUNDING * size
+    span = share * duration
+    return _stays_above(value, next_value, rate, next_rate, span, rest, rounding, has_met)
+
+
+@inlined
+def clearance_course(pair, left, right, next_left, next_right, share, duration):
+    """Predict the clearance of an open interface in a piece, as ``predict_clearance`` does."""
+    value, next_value, rate, next_rate, size = _ends(pair, left, right, next_left, next_right)
+    # acceleration of the clearance at both ends, and the bound of what it is beyond its chord
+    stiffness = pair[OMEGA] * pair[OMEGA]
+    other_stiffness = pair[STRUCTURE_ROWS + OMEGA] * pair[STRUCTURE_ROWS + OMEGA]
+    change = other_stiffness * right[2] - stiffness * left[2]
+    next_change = other_stiffness * next_right[2] - stiffness * next_left[2]
+    error, other_error = _errors(pair, left, right, next_left, next_right, share)
+    bend = stiffness * error + other_stiffness * other_error
+    # bound of what the rate is beyond its chord
+    swing = share * duration * (0.125 * abs(next_change - change) + 0.5 * bend)
+    is_concave = max(change, next_change) + bend < 0.0
+    is_convex = min(change, next_change) - bend > 0.0
+    # sign of the rate inside
+    rises = min(rate, next_rate) > swing
+    rises |= (is_convex & (rate > 0.0)) | (is_concave & (next_rate > 0.0))
+    falls = max(rate, next_rate) < -swing
+    falls |= (is_concave & (rate < 0.0)) | (is_convex & (next_rate < 0.0))
+    if rises:
+        return STAYS_OPEN
+    if not (falls | (is_concave & (rate > 0.0))):
+        return UNCERTAIN
+    # it falls once: its signs at the ends decide
+    if falls & (value <= CLEARANCE_ROUNDING * size):
+        return CLOSES_NOW
+    return CLOSES_ONCE if next_value < 0.0 else STAYS_OPEN
+
+
+@inlined
+def _note_impact(pair, row, log, left, right, approach, time):
+    """Note an impact of a pair in two states: a line of the log only if it may count."""
+    if approach > max(SLOWEST_COUNTED, COUNTED_SHARE * row[0, APPROACH]):
+        set_states(pair, left, right)
+        load_pair(pair, row)
+        apply_impact(row, log, 0, time)
+    else:
+        row[0, APPROACH] = max(row[0, APPROACH], approach)
+        row[0, BOUNCES] += 1.0
+
+
+@inlined
+def _faster(pair, first, state, growth):
+    """Return a state with so much more velocity."""
+    u, z, y = state
+    return u, z + growth, y + pair[first + ACCELERATION + 1] * growth
 
 
 @inlined
@@ -76,22 +212,40 @@ def _raise_both(pair, row, left, right, next_left, next_right, change, share):
 
 
 @inlined
-def next_impact(pair, row, left, right, next_left, next_right, share, segment):
+def _may_yield(pair, left, right, next_left, next_right):
+    """Return whether a structure may yield or unload in a piece; linear ones never do."""
+    if min(pair[YIELD_LIMIT], pair[STRUCTURE_ROWS + YIELD_LIMIT]) == math.inf:
+        return False
+    other_yields = may_yield(pair, STRUCTURE_ROWS, right, next_right)
+    return may_yield(pair, 0, left, next_left) | other_yields
+
+
+@inlined
+def next_impact(pair, row, ends, origin, other_origin, elapsed, segment, has_met):
     """
     Return the time until the impact in a piece, as a share of the step, and both states then.
 
     The time is infinite, and the states are those at the end, if there is no impact; it is -1 if
-    that is uncertain.
+    that is uncertain. Also return the responses for ``add_velocity``; see ``locate_impact_from``.
+    If the pair ``has_met`` its clearance is zero at the start.
     """
-    prediction = predict_clearance(pair, left, right, next_left, next_right, share)
-    if may_yield(pair, 0, left, next_left) or may_yield(pair, STRUCTURE_ROWS, right, next_right):
-        prediction = UNCERTAIN
+    left, right, next_left, next_right = ends
+    remaining = 1.0 - elapsed
+    duration = segment.duration
+    if _may_yield(pair, left, right, next_left, next_right):
+        return -1.0, next_left, next_right, AT_START, AT_START
+    if stays_open(pair, left, right, next_left, next_right, remaining, duration, has_met):
+        return math.inf, next_left, next_right, AT_START, AT_START
     # one way out per prediction
-    if prediction == CLOSES_ONCE:
-        return locate_impact(pair, row, left, right, next_left, next_right, share, segment)
-    if prediction == CLOSES_NOW:
-        return 0.0, left, right
-    return math.inf if prediction == STAYS_OPEN else -1.0, next_left, next_right
+    course = clearance_course(pair, left, right, next_left, next_right, remaining, duration)
+    if course == CLOSES_ONCE:
+        return locate_impact_from(
+            pair, row, ends, origin, other_origin, elapsed, remaining, segment, has_met
+        )
+    if course == CLOSES_NOW and elapsed == 0.0:
+        return 0.0, left, right, AT_START, AT_START
+    time = math.inf if course == STAYS_OPEN else -1.0
+    return time, next_left, next_right, AT_START, AT_START
 
 
 @inlined
@@ -136,33 +290,47 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         Time up to which the step was carried out, s: its duration, when ``pair`` has the state;
         else that of the last impact, when ``row`` has it; or -1 if no impact was carried out.
     """
-    # times are shares of the step
+    # times are shares of the step; free motion from the origins leads through each piece
     elapsed = 0.0
     change = segment.slope * segment.duration
+    origin = left
+    other_origin = right
+    has_met = False
     while True:
         remaining = 1.0 - elapsed
-        share, next_left, next_right = next_impact(
-            pair, row, left, right, next_left, next_right, remaining, segment
+        ends = left, right, next_left, next_right
+        share, hit_left, hit_right, response, other_response = next_impact(
+            pair, row, ends, origin, other_origin, elapsed, segment, has_met
         )
         # uncertain, or an impact without approach: left to the event code
-        if share < 0.0 or (
-            share <= remaining
-            and opening_rate(pair, next_left, next_right) >= -row[0, STICKING_SPEED]
-        ):
+        approach = -opening_rate(pair, hit_left, hit_right)
+        if share < 0.0 or (share <= remaining and approach <= row[0, STICKING_SPEED]):
             break
-        _raise_both(pair, row, left, right, next_left, next_right, change, min(share, remaining))
+        _raise_both(pair, row, left, right, hit_left, hit_right, change, min(share, remaining))
         # no further impact: the end of the step
         if share > remaining:
             set_states(pair, next_left, next_right)
             return segment.duration
-        # the impact, and the states at the end of the step after it
+        # the impact
         elapsed += share
-        left, right = _states_after_impact(pair, row, log, next_left, next_right, segment, elapsed)
+        has_met = True
+        time = segment.start + elapsed * segment.duration
+        _note_impact(pair, row, log, hit_left, hit_right, approach, time)
+        growth = pair[IMPACT_GROWTH] * approach
+        other_growth = pair[IMPACT_GROWTH + 1] * approach
+        left = _faster(pair, 0, hit_left, growth)
+        right = _faster(pair, STRUCTURE_ROWS, hit_right, other_growth)
         if _bounces_end(pair, row, left, right):
             break
-        next_left, next_right = states_inside_step(pair, row, left, right, change, 1.0 - elapsed)
-    if row[0, BOUNCES] == 0.0:
+        # the step after it
+        origin, next_left = add_velocity(pair, 0, origin, next_left, response, growth)
+        other_origin, next_right = add_velocity(
+            pair, STRUCTURE_ROWS, other_origin, next_right, other_response, other_growth
+        )
+    if not has_met:
         return -1.0
     # the row stays at the last impact
+    set_states(pair, left, right)
+    load_pair(pair, row)
     resolve_contact(row, log, segment, elapsed * segment.duration, 0)
     return elapsed * segment.duration

@@ -61,10 +61,11 @@ AXIS_COSINE, AXIS_SINE = 70, 71
 CONTACT_FUNCTION = 72
 #: rounding of the contact function over displacement; its least value at the samples of the tile
 CONTACT_ROUNDING, TILE_CONTACT = 77, 78
-#: least velocity over omega of both structures towards the side that yields, at every
-#: UNROLLED_STEPS-th sample of the tile or more
+#: least velocity over omega of both structures towards the side that yields, in the tile
 TILE_SPEED = 79
-LANE_ROWS = 81
+#: only in the line of a pair: growth of the velocity over omega of both structures in an impact,
+#: over its approach speed (s); 1 while coefficients are not in the lane yet, else 0
+IMPACT_GROWTH, IS_CHANGED, LANE_ROWS = 81, 83, 84
 
 
 @lean
@@ -203,7 +204,6 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         left = step_structure(lanes, 0, lane, left, a3, a4)
         right = step_structure(lanes, second, lane, right, a3, a4)
         least = min(least, contact_value(lanes, lane, left[0], right[0], left[1], a4))
-        # store
         store_structure(lanes, 0, lane, left)
         store_structure(lanes, second, lane, right)
         lanes[at(TILE_CONTACT, lane)] = least

@@ -22,6 +22,7 @@ from per_obspy.kernels.pounding_events.motion import (
     PHASE,
     PLASTIC,
     RAMP_RESPONSE,
+    RESTITUTION,
     STIFFNESS,
     TAYLOR,
     TERM_COUNT,
@@ -31,6 +32,7 @@ from per_obspy.kernels.pounding_events.motion import (
     V,
     cluster_equation,
     fill_taylor,
+    mass_share,
     restoring_force,
     taylor_terms,
 )
@@ -44,6 +46,8 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_ROUNDING,
     DISPLACEMENT,
     DISPLACEMENT_ERROR,
+    IMPACT_GROWTH,
+    IS_CHANGED,
     MAXIMUM_SO_FAR,
     OMEGA,
     POWER_ERROR,
@@ -85,10 +89,16 @@ def write_step(pair, row, i, equation, duration):
     damping, stiffness, drive, constant = equation
     first = i * STRUCTURE_ROWS
     omega = math.sqrt(row[i, STIFFNESS])
+    pair[IS_CHANGED] = 1.0
     # responses of its phase; a touching pair has its own, for which TAYLOR is free between events
     if row[0, IN_CONTACT]:
         responses = TAYLOR
-        fill_responses(row, i, responses, damping, stiffness, duration)
+        if i == 0:
+            fill_responses(row, 0, responses, damping, stiffness, duration)
+        else:
+            # both have one equation, and the first was written before
+            for k in range(6):
+                row[1, responses + k] = row[0, responses + k]
     else:
         responses = ELASTIC_RESPONSES if row[i, PHASE] == 0.0 else YIELDED_RESPONSES
     # displacement (k = 0) and velocity over omega (k = 1) after a step
@@ -233,6 +243,9 @@ def write_constants(pair, row, cosine, sine, duration):
         omega = math.sqrt(stiffness)
         pair[first + OMEGA] = omega
         pair[first + ANGLE] = omega * duration
+        # impact by (7) and (8): the other structure's share of the mass
+        change = (1.0 + row[0, RESTITUTION]) * mass_share(row, 0, 1, 1 - i)
+        pair[IMPACT_GROWTH + i] = (change if i else -change) / omega
 
 
 @lean

@@ -4,13 +4,14 @@ from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.row_history import is_settled
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     fill_ground,
-    read_lane,
+    read_states,
     search_deferred,
     write_lane,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
     AXIS_COSINE,
     AXIS_SINE,
+    IS_CHANGED,
     PAIR_LANES,
     TILE_STEPS,
     sweep_tile,
@@ -31,19 +32,21 @@ GROUPS_BETWEEN_CHECKS = 8
 
 
 @lean
-def prepare_block(lanes, pair, rows, cosine, sine, free_steps, duration):
+def prepare_block(lanes, pairs, rows, cosine, sine, free_steps, duration):
     """Set all lanes to rest, for good those without a pair (``free_steps`` < 0)."""
     for lane in range(PAIR_LANES):
+        pair = pairs[lane]
         pair[:] = 0.0
         write_constants(pair, rows[lane], cosine[lane], sine[lane], duration)
         write_phase(pair, rows[lane], duration)
         if free_steps[lane] < 0:
             rest_pair(pair)
+        pair[IS_CHANGED] = 0.0
         write_lane(lanes, lane, pair)
 
 
 @lean
-def advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, step, last):
+def advance_block(lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     is_through = True
     while step < last:
@@ -54,7 +57,7 @@ def advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, ste
             # flagged lanes one by one
             for lane in range(PAIR_LANES):
                 if flags[lane]:
-                    memory = pair, rows[lane], logs[lane], deferred[lane]
+                    memory = pairs[lane], rows[lane], logs[lane], deferred[lane]
                     is_through &= treat_flagged_lane(
                         lanes, lane, flags[lane], memory, record, grounds, step, count
                     )
@@ -71,7 +74,7 @@ def _is_over(pair, row, record, group):
 
 
 @lean
-def retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, group):
+def retire_still_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, group):
     """
     Rest the lanes whose result no longer changes in the rest of the record.
 
@@ -81,7 +84,8 @@ def retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps,
     for lane in range(PAIR_LANES):
         if free_steps[lane] >= 0:
             # maxima of deferred tiles are larger still: a lane that is over now is over with them
-            read_lane(lanes, lane, pair)
+            pair = pairs[lane]
+            read_states(lanes, lane, pair)
             load_pair(pair, rows[lane])
             if _is_over(pair, rows[lane], record, group):
                 search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
@@ -94,7 +98,7 @@ def retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps,
 
 
 @lean
-def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+def retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
     """
     Rest the lanes whose result is final after so many sampling intervals of free vibration.
 
@@ -104,8 +108,9 @@ def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elaps
     for lane in range(PAIR_LANES):
         if free_steps[lane] >= 0:
             # maxima so far, and the state as a row
+            pair = pairs[lane]
             search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
-            read_lane(lanes, lane, pair)
+            read_states(lanes, lane, pair)
             load_pair(pair, rows[lane])
             is_over = is_settled(rows[lane])
             if not is_over:
@@ -120,7 +125,7 @@ def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elaps
 
 
 @lean
-def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine, sine, free_steps):
+def run_block(record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine, sine, free_steps):
     """
     Run 32 pairs through a record and the free vibration after it.
 
@@ -134,16 +139,17 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine,
         Room for their flags.
     grounds : (2, 2, TILE_STEPS + 1) ndarray
         Room for the north and east acceleration of the current tile and of a deferred one.
-    pair : (LANE_ROWS,) ndarray
-        Room for the numbers of one lane.
+    pairs : (PAIR_LANES, LANE_ROWS) ndarray
+        Room for the numbers of each lane as one line.
     deferred : (PAIR_LANES, 2, DEFERRED_COLUMNS) ndarray
         Deferred tiles of both structures; zero at the start.
     rows : (PAIR_LANES, 2, ROW_COLUMNS) ndarray
         Rows of structures of the pairs at rest, then at the end; see `motion` for the columns. They
-        hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and
-        APPROACH (m/s).
+        hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), APPROACH
+        (m/s) and IMPACTS, the lines of the log.
     logs : (PAIR_LANES, n_lines, LOG_COLUMNS) ndarray
-        Receive one line per impact as long as there is room; see `contact` for their columns.
+        Receive one line per impact that may count, as long as there is room; see `contact` for
+        their columns.
     cosine, sine : (PAIR_LANES,) ndarray
         Of the azimuth of the axis from structure 1 to 2.
     free_steps : (PAIR_LANES,) ndarray of int
@@ -155,7 +161,7 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine,
     bool
         Whether all pairs reached the end: no step had too many events.
     """
-    prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
+    prepare_block(lanes, pairs, rows, cosine, sine, free_steps, record.duration)
     # the record, as far as any pair needs it
     last = (record.components.shape[1] - 1) * record.refinement
     group = 0
@@ -166,16 +172,18 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine,
         group = min(group + GROUPS_BETWEEN_CHECKS, record.sizes.shape[1])
         end = min(group * GROUP_SAMPLES * record.refinement, last)
         is_through &= advance_block(
-            lanes, flags, pair, rows, logs, deferred, record, grounds, step, end
+            lanes, flags, pairs, rows, logs, deferred, record, grounds, step, end
         )
-        active = retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, group)
+        active = retire_still_lanes(
+            lanes, pairs, rows, deferred, record, grounds, free_steps, group
+        )
     # free vibration, until every pair is settled
     elapsed = 0
-    while retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+    while retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
         step = last
         last += SETTLING_STEPS * record.refinement
         is_through &= advance_block(
-            lanes, flags, pair, rows, logs, deferred, record, grounds, step, last
+            lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last
         )
         elapsed += SETTLING_STEPS
     return is_through

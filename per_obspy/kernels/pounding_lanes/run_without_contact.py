@@ -16,7 +16,7 @@ from per_obspy.kernels.pounding_events.row_history import is_settled, reach_in_f
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     fill_ground,
     raise_maxima_of_tile,
-    read_lane,
+    read_states,
     search_deferred,
     write_lane,
 )
@@ -265,7 +265,7 @@ def _treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count)
         return True
     # an event: earlier maxima first, then the tile again from its start
     search_deferred(lanes, lane, pair, row, deferred, record, grounds[1])
-    read_lane(lanes, lane, pair)
+    read_states(lanes, lane, pair)
     is_through = _step_through_tile(pair, row, log, grounds[0], count, record.duration)
     lanes[at(RELATIVE_SO_FAR, lane)] = row[0, OPENING]
     lanes[at(RELATIVE_SO_FAR + 1, lane)] = row[1, OPENING]
@@ -274,7 +274,7 @@ def _treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count)
 
 
 @lean
-def _advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, step, last):
+def _advance_block(lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     is_through = True
     while step < last:
@@ -285,7 +285,7 @@ def _advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, st
         # flagged lanes one by one
         for lane in range(PAIR_LANES):
             if flags[lane]:
-                memory = pair, rows[lane], logs[lane], deferred[lane]
+                memory = pairs[lane], rows[lane], logs[lane], deferred[lane]
                 is_through &= _treat_flagged_lane(
                     lanes, lane, flags[lane], memory, record, grounds, step, count
                 )
@@ -304,7 +304,7 @@ def _is_over(row):
 
 
 @lean
-def _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+def _retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
     """
     Rest the lanes whose result is final after so many sampling intervals of free vibration.
 
@@ -314,8 +314,9 @@ def _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elap
     for lane in range(PAIR_LANES):
         if free_steps[lane] >= 0:
             # maxima so far, and the state as a row
+            pair = pairs[lane]
             search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
-            read_lane(lanes, lane, pair)
+            read_states(lanes, lane, pair)
             load_pair(pair, rows[lane])
             if elapsed >= free_steps[lane] or _is_over(rows[lane]):
                 free_steps[lane] = -1
@@ -330,14 +331,14 @@ def _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elap
 
 @lean
 def run_without_contact(
-    record, lanes, flags, grounds, pair, deferred, rows, logs, cosine, sine, free_steps
+    record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine, sine, free_steps
 ):
     """
     Run 32 pairs that never touch through a record and the free vibration after it.
 
     Parameters
     ----------
-    record, flags, grounds, pair, deferred, logs, cosine, sine, free_steps
+    record, flags, grounds, pairs, deferred, logs, cosine, sine, free_steps
         As in `run_block`.
     lanes : (LANE_ROWS_WITHOUT_CONTACT * PAIR_LANES,) ndarray
         Room for the numbers of all lanes.
@@ -351,7 +352,7 @@ def run_without_contact(
     bool
         Whether all pairs got through: no step had too many events.
     """
-    prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
+    prepare_block(lanes, pairs, rows, cosine, sine, free_steps, record.duration)
     # a lane without pair is never flagged
     for lane in range(PAIR_LANES):
         largest = 0.0 if free_steps[lane] >= 0 else UNREACHABLE
@@ -359,14 +360,14 @@ def run_without_contact(
         lanes[at(RELATIVE_SO_FAR + 1, lane)] = largest
     # the record
     last = (record.components.shape[1] - 1) * record.refinement
-    is_through = _advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, 0, last)
+    is_through = _advance_block(lanes, flags, pairs, rows, logs, deferred, record, grounds, 0, last)
     # free vibration, until every pair is settled
     elapsed = 0
-    while _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+    while _retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
         step = last
         last += SETTLING_STEPS * record.refinement
         is_through &= _advance_block(
-            lanes, flags, pair, rows, logs, deferred, record, grounds, step, last
+            lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last
         )
         elapsed += SETTLING_STEPS
     return is_through

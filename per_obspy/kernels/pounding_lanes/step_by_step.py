@@ -23,7 +23,7 @@ from per_obspy.kernels.pounding_events.motion import (
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     raise_maxima_of_tile,
-    read_lane,
+    read_states,
     search_deferred,
     write_lane,
 )
@@ -34,6 +34,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
     DISPLACEMENT_ERROR,
     EVENT_FLAG,
+    IS_CHANGED,
     MAXIMUM_SO_FAR,
     RADIUS_SQUARED_SO_FAR,
     START_DISPLACEMENT,
@@ -41,6 +42,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     STRUCTURE_ROWS,
     VELOCITY,
     VELOCITY_ERROR,
+    at,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     complete_state,
@@ -212,12 +214,17 @@ def step_through_tile(pair, row, log, ground, count, duration):
 
 @lean
 def write_back(lanes, lane, pair, row):
-    """Copy a pair back to its lane, with the maxima of its row."""
+    """Copy a pair back to its lane, with the maxima of its row, and coefficients that are new."""
+    if pair[IS_CHANGED] != 0.0:
+        pair[IS_CHANGED] = 0.0
+        write_lane(lanes, lane, pair)
+    # state and maxima
     for i in range(2):
         first = i * STRUCTURE_ROWS
-        pair[first + MAXIMUM_SO_FAR] = row[i, LARGEST_DISPLACEMENT]
-        pair[first + RADIUS_SQUARED_SO_FAR] = row[i, LARGEST_RADIUS_SQUARED]
-    write_lane(lanes, lane, pair)
+        lanes[at(first + DISPLACEMENT, lane)] = pair[first + DISPLACEMENT]
+        lanes[at(first + VELOCITY, lane)] = pair[first + VELOCITY]
+        lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
+        lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
 
 
 @lean
@@ -237,7 +244,7 @@ def treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count):
         return True
     # an event: earlier maxima first, then the tile again from its start
     search_deferred(lanes, lane, pair, row, deferred, record, grounds[1])
-    read_lane(lanes, lane, pair)
+    read_states(lanes, lane, pair)
     is_through = step_through_tile(pair, row, log, grounds[0], count, record.duration)
     write_back(lanes, lane, pair, row)
     return is_through

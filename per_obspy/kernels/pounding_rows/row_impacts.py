@@ -44,6 +44,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     state_inside_step,
     states_inside_step,
 )
+from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_FUNCTION,
     CONTACT_ROUNDING,
@@ -58,7 +59,6 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     may_yield,
     raise_maxima_inside,
 )
-from per_obspy.kernels.pounding_rows.clearance_bounds import clearance_course, stays_open
 from per_obspy.kernels.pounding_rows.member_phases import update_phases
 from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 

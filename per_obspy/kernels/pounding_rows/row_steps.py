@@ -7,6 +7,7 @@ event to event, by the code of single histories (``next_event``).
 
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.motion import BOUNCES, IN_CONTACT
+from per_obspy.kernels.pounding_lanes.impact_steps import stays_open
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
     START_DISPLACEMENT,
@@ -19,7 +20,6 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     state_after_step,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import segment_of_step
-from per_obspy.kernels.pounding_rows.clearance_bounds import stays_open
 from per_obspy.kernels.pounding_rows.member_phases import load_row
 from per_obspy.kernels.pounding_rows.row_impacts import (
     END,

@@ -281,9 +281,9 @@ def _run_logged(
 
 
 def _working_memory(lane_rows: int) -> tuple[FloatArray | NDArray[np.int64], ...]:
-    """Return the memory of one block: lanes, flags, ground of two tiles, a pair, waiting tiles."""
+    """Return the memory of one block: lanes, flags, ground of two tiles, pairs, waiting tiles."""
     lanes = aligned(lane_rows * PAIR_LANES)
     flags = aligned(PAIR_LANES).view(np.int64)
-    grounds, pair = np.empty((2, 2, TILE_STEPS + 1)), np.empty(LANE_ROWS)
+    grounds, pairs = np.empty((2, 2, TILE_STEPS + 1)), np.empty((PAIR_LANES, LANE_ROWS))
     waiting = np.zeros((PAIR_LANES, 2, DEFERRED_COLUMNS))
-    return lanes, flags, grounds, pair, waiting
+    return lanes, flags, grounds, pairs, waiting

@@ -1,7 +1,7 @@
 """
 Clearances of two oscillators in a piece of a step, against the same motion at many times.
 
-Covers ``per_obspy.kernels.pounding_rows.clearance_bounds``.
+Covers ``per_obspy.kernels.pounding_lanes.impact_steps``.
 """
 
 import numpy as np
@@ -14,10 +14,10 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     STAYS_OPEN,
     states_inside_step,
 )
+from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.lanes import CONTACT_FUNCTION, LANE_ROWS
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state
 from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
-from per_obspy.kernels.pounding_rows.clearance_bounds import clearance_course, stays_open
 
 STEP, COUNT = 0.02, 500
 #: Times at which the motion inside a piece is looked at, as shares of the piece.
