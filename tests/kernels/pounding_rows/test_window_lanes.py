@@ -122,6 +122,54 @@ def test_maxima_in_a_piece():
     assert (inside > 5).all()
 
 
+def solve_for(some, share, wanted):
+    """Set the state of one building, and the ground, to a start and a velocity at the end."""
+    found = []
+    # The motion is linear in displacement, velocity and the ground at the start and its change
+    for unit in np.eye(4):
+        some.u[0], some.z[0], some.ground, some.change = unit
+        start, end = some.exact(0, 0.0), some.exact(0, share)
+        found.append([start[0], start[1], start[2], end[1]])
+    numbers = np.linalg.solve(np.transpose(found), wanted)
+    some.u[0], some.z[0], some.ground, some.change = numbers
+
+
+def test_a_building_that_turns_twice_in_a_piece():
+    # catches: a velocity that is taken for its chord
+    random = np.random.default_rng(7)
+    for share in (0.1, 1.0):
+        some = Buildings(random, 1)
+        angle = share * STEP * some.omega[0]
+        slow = 0.1 * angle * 0.02
+        # Velocities are alike at both ends, and reversed in between
+        solve_for(some, share, [0.03, slow, -0.02, slow])
+        states = np.array([some.exact(0, share * s) for s in INSIDE])
+        start, end = tuple(states[0]), tuple(states[-1])
+        some.row[0, columns.LARGEST_DISPLACEMENT] = start[0]
+        raise_maximum(some.members[0], some.row, 0, start, end, some.change, share)
+        largest = states[:, 0].max()
+        assert largest > (1.0 + 1e-9) * start[0]
+        assert some.row[0, columns.LARGEST_DISPLACEMENT] >= largest * (1.0 - 1e-13)
+
+
+def test_a_radius_that_is_largest_inside_is_not_left_out():
+    # catches: a bound of the radius without the acceleration
+    random = np.random.default_rng(8)
+    for fraction in (0.1, 1.0):
+        some = Buildings(random, 1)
+        share = fraction * min(some.longest, 1.0)
+        angle = share * STEP * some.omega[0]
+        # It is as fast at the end as at the start, and faster in between
+        solve_for(some, share, [-0.5 * angle * 0.05, 0.05, 0.5, 0.05])
+        radius = np.array([np.hypot(*some.exact(0, share * s)[:2]) for s in INSIDE])
+        assert radius.max() > (1.0 + 1e-6) * max(radius[0], radius[-1])
+        some.lanes(window_rows.NOW)[0], some.lanes(window_rows.NOW + 1)[0] = some.u[0], some.z[0]
+        window_rows.fill_polynomials(some.window, some.ground, some.change)
+        some.lanes(window_rows.LARGEST)[0] = (1.0 - 1e-9) * radius.max()
+        window_rows.move_buildings(some.window, share, some.ground + share * some.change)
+        assert some.lanes(window_rows.MAY_EXCEED)[0] == 1.0
+
+
 def polynomial_of(random, room):
     """Return the coefficients of a random clearance whose terms are of like size in a room."""
     powers = room ** np.arange(TERMS)
