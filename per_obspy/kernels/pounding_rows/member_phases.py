@@ -51,7 +51,6 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     YIELD_SIDE,
 )
 from per_obspy.kernels.pounding_lanes.pair_rows import (
-    fill_ramp_response,
     fill_responses,
     write_error_bounds,
 )
@@ -60,6 +59,10 @@ from per_obspy.kernels.pounding_lanes.pair_rows import (
 #: first and last member of the cluster for which the coefficients were written, and whether they
 #: have to be written again
 CLUSTER_FIRST, CLUSTER_LAST, IS_OUTDATED = 43, 44, 45
+#: whether the coefficients of a step have to be written again
+IS_STEP_OUTDATED = 46
+#: largest rate of the row times the duration of a step; first member only
+LARGEST_RATE = 47
 
 #: Rounding of a contact force, over the stiffness times displacement.
 FORCE_ROUNDING = 1e-12
@@ -87,7 +90,14 @@ def _write_step(member, row, i, is_alone, equation, duration):
         member[target + 2] = -scale * drive * (by_force - by_ramp)
         member[target + 3] = -scale * drive * by_ramp
         member[target + 4] = scale * constant * by_force
-    # acceleration over omega²
+
+
+@lean
+def _write_acceleration(member, row, i, equation):
+    """Write the coefficients of the acceleration of building i over omega²."""
+    damping, stiffness, drive, constant = equation
+    omega = math.sqrt(row[i, STIFFNESS])
+    # by displacement, velocity and ground, and the constant
     member[ACCELERATION] = -stiffness / row[i, STIFFNESS]
     member[ACCELERATION + 1] = -damping / omega
     member[ACCELERATION + 2] = -drive / row[i, STIFFNESS]
@@ -180,12 +190,12 @@ def _mark_outdated(members, row):
 
 
 @lean
-def write_phases(members, row, duration):
+def write_phases(members, row):
     """
-    Write all numbers of the members that depend on phase and contact, where these are new.
+    Write the numbers of the members that depend on phase and contact, where these are new.
 
-    These are the coefficients of the step, elastic range, error bounds and contact function;
-    ``duration`` is that of a step, s.
+    These are the coefficients of the acceleration, elastic range, error bounds and contact
+    function; those of a complete step are left to ``write_steps``.
     """
     first = 0
     while first < row.shape[0]:
@@ -194,14 +204,14 @@ def write_phases(members, row, duration):
             if members[i, IS_OUTDATED]:
                 member = members[i]
                 equation = _equation_of(row, first, last, i)
-                _write_step(member, row, i, first == last, equation, duration)
+                _write_acceleration(member, row, i, equation)
+                member[IS_STEP_OUTDATED] = 1.0
                 # elastic range; a yielding structure is always looked at
                 side = row[i, PHASE]
                 member[YIELD_LIMIT] = row[i, YIELD] if side == 0 else -math.inf
                 member[YIELD_CENTRE] = row[i, PLASTIC]
                 member[YIELD_SIDE] = side
                 write_error_bounds(member, 0)
-                fill_ramp_response(member, row[i : i + 1], 0)
                 # interface to the next building
                 if i < last:
                     _write_contact_force(member, row, first, last, i, equation)
@@ -217,12 +227,36 @@ def write_phases(members, row, duration):
 
 
 @lean
-def update_phases(members, row, duration):
+def update_phases(members, row):
     """Write the numbers of new phases; return whether there is one."""
     is_any = _mark_outdated(members, row)
     if is_any:
-        write_phases(members, row, duration)
+        write_phases(members, row)
     return is_any
+
+
+@lean
+def write_steps(members, row, duration):
+    """Write the coefficients of a step, s, of the members in a new phase, if it lasts so long."""
+    first = 0
+    while first < row.shape[0]:
+        last = last_of_cluster(row, first)
+        for i in range(first, last + 1):
+            # those that have changed their phase since the last complete step
+            if members[i, IS_STEP_OUTDATED]:
+                equation = _equation_of(row, first, last, i)
+                _write_step(members[i], row, i, first == last, equation, duration)
+                members[i, IS_STEP_OUTDATED] = 0.0
+        first = last + 1
+
+
+@lean
+def _largest_rate(row):
+    """Return the largest rate of the motion of a row, as ``taylor_terms`` has it, 1/s."""
+    largest = 0.0
+    for i in range(row.shape[0]):
+        largest = max(largest, math.sqrt(row[i, STIFFNESS]) + row[i, DAMPING_RATE])
+    return largest
 
 
 @lean
@@ -247,7 +281,9 @@ def write_constants(members, row, cosine, sine, duration):
         member[OMEGA] = omega
         member[ANGLE] = omega * duration
         member[IS_OUTDATED] = 1.0
-    write_phases(members, row, duration)
+    members[0, LARGEST_RATE] = _largest_rate(row) * duration
+    write_phases(members, row)
+    write_steps(members, row, duration)
 
 
 @lean

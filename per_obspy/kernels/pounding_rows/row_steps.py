@@ -5,32 +5,78 @@ Steps that certainly hold no event use the same formulas as ``building_lanes``; 
 event to event, by the code of single histories (``next_event``).
 """
 
-from per_obspy.kernels._jit import lean
-from per_obspy.kernels.pounding_events.motion import BOUNCES, IN_CONTACT
+import math
+
+from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels.pounding_events.motion import (
+    BOUNCES,
+    IN_CONTACT,
+    LARGEST_DISPLACEMENT,
+    YIELD,
+)
 from per_obspy.kernels.pounding_lanes.impact_steps import stays_open
 from per_obspy.kernels.pounding_lanes.lanes import (
+    CONTACT_FUNCTION,
+    CONTACT_ROUNDING,
     DISPLACEMENT,
+    DISPLACEMENT_ERROR,
     START_DISPLACEMENT,
     START_VELOCITY,
     VELOCITY,
+    VELOCITY_ERROR,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     complete_state,
     ground_along,
+    may_yield,
     state_after_step,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import segment_of_step
 from per_obspy.kernels.pounding_rows.member_phases import load_row
-from per_obspy.kernels.pounding_rows.row_impacts import (
-    END,
-    START,
-    may_meet_or_part,
-    may_yield_in_piece,
-    raise_maxima,
-    run_row_impacts,
-    set_state,
-    state,
-)
+from per_obspy.kernels.pounding_rows.pieces import END, START, raise_maximum, set_state, state
+from per_obspy.kernels.pounding_rows.row_impacts import run_row_impacts
+
+
+@inlined
+def _contact_value(members, states, j, column, ground):
+    """Return the contact function of interface j: positive until its buildings meet or part."""
+    # part of the velocity and the ground, then both displacements
+    form = members[j, CONTACT_FUNCTION + 2] * states[j, column + 1] + (
+        members[j, CONTACT_FUNCTION + 3] * ground + members[j, CONTACT_FUNCTION + 4]
+    )
+    return members[j, CONTACT_FUNCTION] * states[j, column] + (
+        members[j, CONTACT_FUNCTION + 1] * states[j + 1, column] + form
+    )
+
+
+@lean
+def _may_meet_or_part(members, row, states, j, ground_start, ground_end):
+    """Return whether the contact function of an interface may fall through zero in a piece."""
+    # least value at the ends of the piece
+    least = min(
+        _contact_value(members, states, j, START, ground_start),
+        _contact_value(members, states, j, END, ground_end),
+    )
+    # error bound of the contact function: part of the left building, then of the right one
+    margin = (
+        abs(members[j, CONTACT_FUNCTION]) * members[j, DISPLACEMENT_ERROR]
+        + abs(members[j, CONTACT_FUNCTION + 2]) * members[j, VELOCITY_ERROR]
+    )
+    margin *= max(abs(states[j, START + 2]), abs(states[j, END + 2]))
+    other = abs(members[j, CONTACT_FUNCTION + 1]) * members[j + 1, DISPLACEMENT_ERROR]
+    margin += other * max(abs(states[j + 1, START + 2]), abs(states[j + 1, END + 2]))
+    return least - margin < -members[j, CONTACT_ROUNDING] * row[j, LARGEST_DISPLACEMENT]
+
+
+@lean
+def _may_yield_in_step(members, row, states):
+    """Return whether a building may yield or unload in a piece."""
+    for i in range(row.shape[0]):
+        if row[i, YIELD] < math.inf and may_yield(
+            members[i], 0, state(states, i, START), state(states, i, END)
+        ):
+            return True
+    return False
 
 
 @lean
@@ -50,11 +96,11 @@ def _may_hold_event(members, row, states, before, after, duration):
     """Return whether bounds do not exclude contact, release, yielding or unloading in a step."""
     for j in range(row.shape[0] - 1):
         # by the chord of its contact function, then by a cubic
-        if may_meet_or_part(members, row, states, j, before, after) and not _is_open_in_step(
+        if _may_meet_or_part(members, row, states, j, before, after) and not _is_open_in_step(
             members, row, states, j, duration
         ):
             return True
-    return may_yield_in_piece(members, row, states)
+    return _may_yield_in_step(members, row, states)
 
 
 @lean
@@ -66,7 +112,7 @@ def set_members(members, row, states, column):
 
 
 @lean
-def step_row_through_tile(members, row, log, states, ground, count, duration):
+def step_row_through_tile(members, row, log, states, window, ground, count, duration):
     """
     Carry a row through a tile that may hold an event.
 
@@ -80,6 +126,8 @@ def step_row_through_tile(members, row, log, states, ground, count, duration):
         Log of impacts.
     states : (n_buildings, STATE_COLUMNS) ndarray
         Room for the states of a step.
+    window : (WINDOW_SIZE,) ndarray
+        Room for the lanes of a window.
     ground : (2, TILE_STEPS + 1) ndarray
         North and east acceleration at the tile's samples, m/s².
     count : int
@@ -111,9 +159,11 @@ def step_row_through_tile(members, row, log, states, ground, count, duration):
             load_row(members, row)
             row[0, BOUNCES] = 0.0
             segment = segment_of_step(row, before, after, duration)
-            is_through &= run_row_impacts(members, row, log, states, segment)
+            is_through &= run_row_impacts(members, row, log, states, window, segment)
         else:
-            raise_maxima(members, row, states, END, after - before, 1.0)
+            for i in range(row.shape[0]):
+                ends = state(states, i, START), state(states, i, END)
+                raise_maximum(members[i], row, i, ends[0], ends[1], after - before, 1.0)
         # on to the next step
         for i in range(row.shape[0]):
             set_state(states, i, START, state(states, i, END))

@@ -83,7 +83,7 @@ def _raise_maxima_of_tile(lanes, lane, memory, record, ground, step, count):
 @lean
 def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
     """Treat the flagged lanes of a row after the sweep; return whether it got through."""
-    members, row, log, states, deferred = memory
+    members, row, log, states, deferred, window = memory
     # flags of the row
     together = 0
     for i in range(row.shape[0]):
@@ -101,7 +101,7 @@ def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
         _search_deferred(lanes, first + i, own, record, grounds[1])
         read_lane(lanes, first + i, members[i])
     is_through = step_row_through_tile(
-        members, row, log, states, grounds[0], count, record.duration
+        members, row, log, states, window, grounds[0], count, record.duration
     )
     for i in range(row.shape[0]):
         members[i, MAXIMUM_SO_FAR] = row[i, LARGEST_DISPLACEMENT]
@@ -117,7 +117,7 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
 
     Return the number of the others.
     """
-    members, lines, _, _, deferred = memory
+    members, lines, _, _, deferred, _ = memory
     active = 0
     for number in range(firsts.size - 1):
         if free_steps[number] >= 0:
@@ -154,7 +154,7 @@ def _retire_still_rows(lanes, memory, firsts, cosine, sine, record, grounds, fre
 
     Return the number of the others.
     """
-    members, lines, _, states, deferred = memory
+    members, lines, _, states, deferred, _ = memory
     duration = GROUP_SAMPLES * record.refinement * record.duration
     active = 0
     for number in range(firsts.size - 1):
@@ -188,7 +188,7 @@ def _retire_still_rows(lanes, memory, firsts, cosine, sine, record, grounds, fre
 @lean
 def _advance_rows(lanes, flags, memory, firsts, record, grounds, step, last):
     """Carry all rows from a step to the last one; return whether all got through."""
-    members, lines, logs, states, deferred = memory
+    members, lines, logs, states, deferred, window = memory
     is_through = True
     while step < last:
         # all lanes side by side through one tile
@@ -205,6 +205,7 @@ def _advance_rows(lanes, flags, memory, firsts, record, grounds, step, last):
                     logs[number],
                     states[first:end],
                     deferred[first:end],
+                    window,
                 )
                 is_through &= _treat_row(lanes, flags, first, own, record, grounds, step, count)
         step += count
@@ -230,8 +231,8 @@ def run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free_s
         Room for lanes as lines (PAIR_LANES, LANE_ROWS); lines of all buildings (PAIR_LANES,
         ROW_COLUMNS) at rest, then at the end, see `motion` for the columns; logs (n_rows, n_lines,
         LOG_COLUMNS), which receive one line per impact as long as there is room; room for states
-        (PAIR_LANES, STATE_COLUMNS) and deferred tiles (PAIR_LANES, DEFERRED_COLUMNS), zero at the
-        start.
+        (PAIR_LANES, STATE_COLUMNS), deferred tiles (PAIR_LANES, DEFERRED_COLUMNS) and a window
+        (WINDOW_SIZE,), zero at the start.
     firsts : (n_rows + 1,) ndarray of int
         First lane of each row, then the number of buildings.
     cosine, sine : (n_rows,) ndarray
@@ -244,7 +245,7 @@ def run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free_s
     bool
         Whether all rows got through: no step had too many events.
     """
-    members, lines, _, _, _ = memory
+    members, lines, _, _, _, _ = memory
     _prepare(lanes, members, lines, firsts, cosine, sine, record.duration)
     # the record, as far as any row needs it
     last = (record.components.shape[1] - 1) * record.refinement

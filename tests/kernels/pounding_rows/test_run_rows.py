@@ -60,6 +60,22 @@ def test_lanes_agree_with_the_single_history(restitution, limit, gap):
     assert_allclose(maxima.displacement, history.displacement_maxima, rtol=1e-5)
 
 
+@pytest.mark.parametrize("limit", [0.01, math.inf])
+def test_a_row_of_more_buildings_than_one_loop_takes(limit):
+    # catches: a ninth building that is left out, or has the interface of the first
+    periods = [0.9, 0.4, 0.6, 0.5, 0.8, 0.45, 0.7, 0.55, 0.3, 0.65]
+    structures = [Structure(period, 0.05, 1.0, limit, 0.1) for period in periods]
+    some = 0.002, 0.3
+    history = pounding_history(PULSE[:20], 0.02, structures, *some, free_vibration=False)
+    maxima = row_maxima(
+        PULSE[:20], 0.0 * PULSE[:20], 0.02, row_of(structures, *some), free_vibration=False
+    )
+    assert len(history.impacts) > 100
+    # bounces end earlier in the lanes
+    assert_allclose(maxima.radius, history.per, rtol=1e-5)
+    assert_allclose(maxima.displacement, history.displacement_maxima, rtol=1e-5)
+
+
 def test_free_vibration_is_followed_until_it_is_settled():
     # catches: maxima of the record alone; the pulse ends long before the slow structures turn
     structures = [Structure(4.0, 0.02, 1.0), Structure(0.5, 0.02, 1.0), Structure(3.0, 0.02, 1.0)]

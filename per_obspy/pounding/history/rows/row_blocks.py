@@ -10,9 +10,10 @@ from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
+from per_obspy.kernels.pounding_rows.pieces import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
+from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
 from per_obspy.pounding.history.pair_blocks import (
     KeptLogs,
     aligned,
@@ -256,7 +257,7 @@ def _run_in_lanes(
     members = np.zeros((PAIR_LANES, LANE_ROWS))
     states = np.zeros((PAIR_LANES, STATE_COLUMNS))
     deferred = np.zeros((PAIR_LANES, DEFERRED_COLUMNS))
-    memory = members, lines, logs, states, deferred
+    memory = members, lines, logs, states, deferred, aligned(WINDOW_SIZE)
     is_through = run_rows(record, lanes, flags, grounds, memory, firsts, *direction, free)
     own[:] = lines[: len(own)]
     return bool(is_through)
