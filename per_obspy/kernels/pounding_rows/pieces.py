@@ -17,6 +17,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     VELOCITY_ERROR,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import raise_maxima_inside
+from per_obspy.kernels.pounding_lanes.pair_rows import fill_ramp_response
 
 # columns of the states of a row in a step: displacement, velocity over omega and acceleration over
 # omega² (m), at its start and at its end
@@ -82,4 +83,7 @@ def _may_exceed(member, row, i, start, end, share):
 def raise_maximum(member, row, i, start, end, change, share):
     """Raise the maxima of building i to those between two states, a share of the step apart."""
     if _may_exceed(member, row, i, start, end, share):
-        raise_maxima_inside(member, row[i : i + 1], 0, start, end, change, share)
+        # Turning points need the response to a ramp
+        line = row[i : i + 1]
+        fill_ramp_response(member, line, 0)
+        raise_maxima_inside(member, line, 0, start, end, change, share)

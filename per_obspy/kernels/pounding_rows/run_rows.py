@@ -24,7 +24,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     at,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
-from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair
+from per_obspy.kernels.pounding_lanes.pair_rows import fill_ramp_response, rest_pair
 from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES
 from per_obspy.kernels.pounding_lanes.run_block import GROUPS_BETWEEN_CHECKS, SETTLING_STEPS
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
@@ -63,6 +63,7 @@ def _search_deferred(lanes, lane, memory, record, ground):
         # maxima of the tile
         u = deferred[0, FIRST_DISPLACEMENT]
         z = deferred[0, FIRST_VELOCITY]
+        fill_ramp_response(member, line, 0)
         search_tile(member, line, 0, u, z, ground, int(deferred[0, STEP_COUNT]))
         lanes[at(MAXIMUM_SO_FAR, lane)] = line[0, LARGEST_DISPLACEMENT]
         lanes[at(RADIUS_SQUARED_SO_FAR, lane)] = line[0, LARGEST_RADIUS_SQUARED]

@@ -9,6 +9,7 @@ from per_obspy import threads
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.row_history import pounding_history
 from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.history.rows import row_blocks
 from per_obspy.pounding.structure import Structure
 from per_obspy.spectra.elastic import per_spectrum
 
@@ -103,6 +104,25 @@ class TestSingleHistories:
             abs(n[:-1] - c[: n.size - 1]).sum() for n, c in zip(found, counts, strict=True)
         ]
         assert sum(difference) <= (0 if tolerance == 1e-9 else 0.02 * total)
+
+    @pytest.mark.parametrize("restitution", [0.3, 0.65])
+    def test_rows_of_light_and_heavy_buildings(self, restitution):
+        # catches: bounces that end too early. A light building between two heavy ones is thrown to
+        # and fro thousands of times in one step; with a limit of 400 radii are off by 1e-3 to 0.4
+        rows = plain(random_rows([5] * 4, gap=(0.0, 0.0), seed=3))
+        rows.mass[:] = np.resize([1.0, 100.0], rows.mass.size)
+        rows.restitution[:] = restitution
+        maxima = row_maxima(NORTH, EAST, DT, rows)
+        expected = np.concatenate([history.per for history in histories(rows)])
+        assert_allclose(maxima.radius, expected, rtol=1e-6)  # required of maxima
+
+    def test_rows_with_too_many_impacts_are_refused(self, monkeypatch):
+        # catches: logs that take the memory of the machine
+        monkeypatch.setattr(row_blocks, "FIRST_ROOM", 4)
+        monkeypatch.setattr(row_blocks, "MOST_IMPACTS", 8)
+        rows = plain(random_rows([5], gap=(0.0, 0.0), seed=3))
+        with pytest.raises(RuntimeError, match="impacts that may count, most 8"):
+            row_maxima(NORTH, EAST, DT, rows)
 
     @pytest.mark.parametrize("gap", [0.0, 0.02])
     def test_yielding_rows(self, gap):

@@ -27,6 +27,10 @@ IntArray = NDArray[np.int64]
 #: Impacts of a row that may count for which there is room at first.
 FIRST_ROOM = 1 << 14
 
+#: Impacts of a row that may count at most: their log takes 300 MB. Touching rows whose masses
+#: differ by a factor of a million have more.
+MOST_IMPACTS = 1 << 22
+
 #: Rows of which a block keeps the logs: as many rows of three buildings as it has.
 MOST_ROWS = PAIR_LANES // 3
 
@@ -205,7 +209,7 @@ def run_logged_block(
     Raises
     ------
     RuntimeError
-        If a step has more events than any record causes.
+        If a step has more events than any record causes, or a row too many impacts.
     """
     direction = np.cos(azimuth), np.sin(azimuth)
     room = kept.impacts
@@ -223,6 +227,8 @@ def run_logged_block(
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
         if impacts <= room:
             return own, logs
+        if impacts > MOST_IMPACTS:
+            raise RuntimeError(f"a row has {impacts} impacts that may count, most {MOST_IMPACTS}")
         kept.keep(logs)
         room = impacts
 
