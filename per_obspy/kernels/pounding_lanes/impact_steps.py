@@ -60,6 +60,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     STRUCTURE_ROWS,
     VELOCITY,
     YIELD_LIMIT,
+    YIELD_SIDE,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     may_exceed_maxima,
@@ -214,7 +215,9 @@ def _raise_both(pair, row, left, right, next_left, next_right, change, share):
 @inlined
 def _may_yield(pair, left, right, next_left, next_right):
     """Return whether a structure may yield or unload in a piece; linear ones never do."""
-    if min(pair[YIELD_LIMIT], pair[STRUCTURE_ROWS + YIELD_LIMIT]) == math.inf:
+    # a structure that yields now has no limit either
+    is_elastic = (pair[YIELD_SIDE] == 0.0) & (pair[STRUCTURE_ROWS + YIELD_SIDE] == 0.0)
+    if is_elastic & (min(pair[YIELD_LIMIT], pair[STRUCTURE_ROWS + YIELD_LIMIT]) == math.inf):
         return False
     other_yields = may_yield(pair, STRUCTURE_ROWS, right, next_right)
     return may_yield(pair, 0, left, next_left) | other_yields
