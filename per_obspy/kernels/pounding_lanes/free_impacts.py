@@ -121,16 +121,6 @@ def _ramp(share, cubic, slope):
 
 
 @inlined
-def states_inside_step(pair, row, left, right, change, share):
-    """Return ``state_inside_step`` of both structures."""
-    ramp, other_ramp = _ramps(row, share)
-    return (
-        _state_by_ramp(pair, 0, left, change, share, ramp),
-        _state_by_ramp(pair, STRUCTURE_ROWS, right, change, share, other_ramp),
-    )
-
-
-@inlined
 def _equation(pair, first):
     """Return damping and stiffness of a structure with time as the share of a step."""
     angle = pair[first + ANGLE]
@@ -293,21 +283,7 @@ def _guess_after_contact(series, end, share):
 
 
 @lean
-def locate_impact(pair, row, left, right, next_left, next_right, share, segment):
-    """
-    Return the time of the impact in a piece whose clearance closes once, and both states then.
-
-    The time is a share of the step, as is the piece; it is -1 if the impact is not found.
-    """
-    ends = left, right, next_left, next_right
-    time, hit_left, hit_right, _, _ = locate_impact_from(
-        pair, row, ends, left, right, 0.0, share, segment, False
-    )
-    return time, hit_left, hit_right
-
-
-@lean
-def locate_impact_from(pair, row, ends, origin, other_origin, elapsed, share, segment, has_met):
+def locate_impact(pair, row, ends, origin, other_origin, elapsed, share, segment, has_met):
     """
     Return the time until the impact in a piece whose clearance closes once, and both states then.
 

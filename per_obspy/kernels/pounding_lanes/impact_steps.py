@@ -46,7 +46,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     STAYS_OPEN,
     UNCERTAIN,
     add_velocity,
-    locate_impact_from,
+    locate_impact,
     opening_rate,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
@@ -156,7 +156,7 @@ def stays_open(pair, left, right, next_left, next_right, share, duration, has_me
 
 @inlined
 def clearance_course(pair, left, right, next_left, next_right, share, duration):
-    """Predict the clearance of an open interface in a piece, as ``predict_clearance`` does."""
+    """Predict the clearance of an open interface in a piece: one of the four predictions."""
     value, next_value, rate, next_rate, size = _ends(pair, left, right, next_left, next_right)
     # acceleration of the clearance at both ends, and the bound of what it is beyond its chord
     stiffness = pair[OMEGA] * pair[OMEGA]
@@ -229,7 +229,7 @@ def next_impact(pair, row, ends, origin, other_origin, elapsed, segment, has_met
     Return the time until the impact in a piece, as a share of the step, and both states then.
 
     The time is infinite, and the states are those at the end, if there is no impact; it is -1 if
-    that is uncertain. Also return the responses for ``add_velocity``; see ``locate_impact_from``.
+    that is uncertain. Also return the responses for ``add_velocity``; see ``locate_impact``.
     If the pair ``has_met`` its clearance is zero at the start.
     """
     left, right, next_left, next_right = ends
@@ -242,7 +242,7 @@ def next_impact(pair, row, ends, origin, other_origin, elapsed, segment, has_met
     # one way out per prediction
     course = clearance_course(pair, left, right, next_left, next_right, remaining, duration)
     if course == CLOSES_ONCE:
-        return locate_impact_from(
+        return locate_impact(
             pair, row, ends, origin, other_origin, elapsed, remaining, segment, has_met
         )
     if course == CLOSES_NOW and elapsed == 0.0:

@@ -12,7 +12,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     CLOSES_NOW,
     CLOSES_ONCE,
     STAYS_OPEN,
-    states_inside_step,
+    state_inside_step,
 )
 from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.lanes import CONTACT_FUNCTION, LANE_ROWS
@@ -22,6 +22,12 @@ from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_ph
 STEP, COUNT = 0.02, 500
 #: Times at which the motion inside a piece is looked at, as shares of the piece.
 INSIDE = np.linspace(0.0, 1.0, 61)[1:]
+
+
+def states_inside_step(pair, row, left, right, change, share):
+    """Return the states of both structures after a share of a step."""
+    states = enumerate((left, right))
+    return tuple(state_inside_step(pair, row, i, state, change, share) for i, state in states)
 
 
 def pair_of(random):

@@ -100,16 +100,24 @@ def test_two_parts_of_a_step_make_the_step(period, damping):
     assert_allclose(middle, expected, rtol=1e-13)
 
 
+def located(pair, row, states, segment):
+    """Return the time of the impact in a step, and both states then."""
+    origins = states[:2]
+    found = free_impacts.locate_impact(pair, row, tuple(states), *origins, 0.0, 1.0, segment, False)
+    return found[:3]
+
+
 @pytest.mark.parametrize("terms", [4, 5, 10, 11])
 def test_both_series_at_once_are_those_of_each_structure(terms):
     # catches: the last of an odd number of terms left out, even and odd powers exchanged
     pair, row = resting_pair()
     row[0, columns.TERM_COUNT] = terms
     states = complete_state(pair, 0, 0.3, -0.7, 4.0), complete_state(pair, SECOND, -0.1, 0.9, 4.0)
-    both = free_impacts.states_inside_step(pair, row, *states, -7.0, 0.37)
-    for i in range(2):
+    ramps = free_impacts._ramps(row, 0.37)
+    for i, first in enumerate((0, SECOND)):
+        found = free_impacts._state_by_ramp(pair, first, states[i], -7.0, 0.37, ramps[i])
         expected = free_impacts.state_inside_step(pair, row, i, states[i], -7.0, 0.37)
-        assert_allclose(both[i], expected, rtol=1e-14)  # rounding
+        assert_allclose(found, expected, rtol=1e-14)  # rounding
 
 
 def test_predictions_come_true():
@@ -138,7 +146,7 @@ def test_the_clearance_is_zero_where_they_meet():
         if prediction != free_impacts.CLOSES_ONCE:
             continue
         segment = segment_of_step(row, ground_start, ground_end, DURATION)
-        share, *hit = free_impacts.locate_impact(pair, row, *states, 1.0, segment)
+        share, *hit = located(pair, row, states, segment)
         assert abs(GAP - hit[0][0] + hit[1][0]) < 1e-15  # rounding of a few 0.1 m
         # both states lie on the motion of the step
         for i in range(2):
@@ -157,7 +165,7 @@ def test_most_impacts_need_one_correction():
     for left, right, *ends, ground_start, ground_end in cases(pair, row, 400, seed=2):
         if course(pair, left, right, *ends) == free_impacts.CLOSES_ONCE:
             segment = segment_of_step(row, ground_start, ground_end, DURATION)
-            time, *_ = free_impacts.locate_impact(pair, row, left, right, *ends, 1.0, segment)
+            time, *_ = located(pair, row, (left, right, *ends), segment)
             change = ground_end - ground_start
             series, _ = free_impacts._clearance_series(pair, left, right, change, DURATION)
             end = free_impacts._clearance(pair, *ends)
@@ -197,7 +205,7 @@ def test_motion_after_an_impact_is_that_from_another_start(damping):
             continue
         segment = segment_of_step(row, ground_start, ground_end, DURATION)
         change = ground_end - ground_start
-        share, *hit = free_impacts.locate_impact_from(
+        share, *hit = free_impacts.locate_impact(
             pair, row, tuple(states), *states[:2], 0.0, 1.0, segment, False
         )
         for i, growth in enumerate(random.normal(size=2)):
@@ -229,12 +237,15 @@ def test_the_way_back_to_contact_is_estimated_from_its_start():
         left = complete_state(pair, 0, u, z, ground)
         other = (z * pair[lanes.OMEGA] + rate) / pair[SECOND + lanes.OMEGA]
         right = complete_state(pair, SECOND, u - GAP, other, ground)
-        ends = free_impacts.states_inside_step(pair, row, left, right, change, 1.0)
+        ends = [
+            free_impacts.state_inside_step(pair, row, i, state, change, 1.0)
+            for i, state in enumerate((left, right))
+        ]
         states = left, right, *ends
         if course(pair, *states) != free_impacts.CLOSES_ONCE:
             continue
         segment = segment_of_step(row, ground, ground + change, DURATION)
-        time, *hit = free_impacts.locate_impact_from(
+        time, *hit = free_impacts.locate_impact(
             pair, row, states, left, right, 0.0, 1.0, segment, True
         )
         assert abs(GAP - hit[0][0] + hit[1][0]) < 1e-15  # rounding of 0.1 m
