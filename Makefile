@@ -31,7 +31,6 @@ rehearsal: .venv/test
 
 check: .venv/check
 	$(BIN)/python tests/check_density.py
-	$(BIN)/python tests/check_words.py
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy

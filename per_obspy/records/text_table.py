@@ -29,7 +29,7 @@ TABLE_LAYOUTS = ("columns", "rows")
 _Row = tuple[int, list[str]]
 
 
-def read_columns(  # noqa: PLR0913 - a table without a header leaves all of these to the user
+def read_columns(
     path: str | Path,
     *,
     station: str,

@@ -18,7 +18,7 @@ from per_obspy.processing.noise.onset import picked_onset
 from per_obspy.processing.noise.signal_to_noise import significant_samples
 
 
-def acausal_butterworth(  # noqa: PLR0913 - a corner has two names
+def acausal_butterworth(
     data: FloatArray,
     df: float,
     highpass: float | None = None,
