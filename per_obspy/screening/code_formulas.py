@@ -141,16 +141,22 @@ def e030(pair: RuleInputs) -> FloatArray:
 
 
 def iran2800(pair: RuleInputs) -> FloatArray:
-    """Return the sum of both sides of the property line by Iran's standard 2800."""
+    """
+    Return the sum of both sides of the property line by Iran's standard 2800.
+
+    Within one property the root of the sum of squares of two displacements is enough; a share of
+    the height of either building keeps the sum.
+    """
     share = 0.005 * pair.contact_height
-    gap = np.zeros_like(share)
+    total_gap, by_displacement = np.zeros_like(share), np.ones(share.shape, dtype=bool)
     for displacement, storeys, importance in zip(
         pair.displacement, pair.storeys, pair.importance, strict=True
     ):
         # The share alone only where storeys are few and importance is known to be ordinary
         simple = (storeys <= IRAN_STOREYS) & (importance <= 1.0)
-        gap += np.where(simple, share, np.maximum(share, displacement))
-    return gap
+        total_gap += np.where(simple, share, np.maximum(share, displacement))
+        by_displacement &= ~simple & (displacement >= share)
+    return np.where(pair.one_property & by_displacement, root_of_squares(pair), total_gap)
 
 
 def rpa99(pair: RuleInputs) -> FloatArray:
@@ -166,8 +172,9 @@ def rpa2024(pair: RuleInputs) -> FloatArray:
 def nch433(pair: RuleInputs) -> FloatArray:
     """Return the gap of NCh433, 5.10, each side at least 0.002 of the height and 15 mm."""
     least = np.maximum(0.002 * pair.contact_height, 0.015)
-    sides = tuple(np.maximum(displacement, least) for displacement in pair.displacement)
-    return np.where(pair.one_property, np.hypot(*sides), np.add(*sides))
+    side_1, side_2 = (np.maximum(displacement, least) for displacement in pair.displacement)
+    gap: FloatArray = side_1 + side_2
+    return gap
 
 
 def started_steps(height: FloatArray, step: float) -> FloatArray:

@@ -63,7 +63,6 @@ BY_PROPERTY = (
     "required_gap_asce7_event_based",
     "required_gap_asce7_22_event_based_unverified",
     "required_gap_ec8_event_based_unverified",
-    "required_gap_nch433_event_based_unverified",
 )
 
 
@@ -220,11 +219,21 @@ def test_the_italian_rule(ground, displacement, expected):
         ({"importance_1": 1.4, "importance_2": 1.0}, 0.32),
         ({}, 0.32),
         ({"importance_1": 1.0, "importance_2": 1.0, "storeys_1": 9.0}, 0.32),
+        # within one property: squares of two displacements, never of a share of the height
+        ({"importance_1": 1.0, "importance_2": 1.0, "same_property": "yes"}, 0.24),
+        ({"same_property": "yes"}, 0.32),
     ],
 )
 def test_the_iranian_rule_by_storeys_and_importance(change, expected):
     pairs = _pairs(**change)
     assert_allclose(_rule("required_gap_iran2800_event_based", pairs, 0.2, 0.05), expected)
+
+
+@pytest.mark.parametrize(("same", "expected"), [("no", 0.35), ("yes", 0.25), ("", 0.35)])
+def test_the_iranian_rule_adds_squares_of_displacements_within_one_property(same, expected):
+    # Importance is unknown: displacements of 0.15 and 0.2 m count, both above 0.12 m of the share
+    pairs = _pairs(same_property=same)
+    assert_allclose(_rule("required_gap_iran2800_event_based", pairs, 0.15, 0.2), expected)
 
 
 def test_the_algerian_rules_by_edition():
@@ -239,7 +248,7 @@ def test_the_chilean_rule_keeps_a_least_distance_on_each_side():
     name = "required_gap_nch433_event_based_unverified"
     # 0.002 of 24 m is 48 mm, more than 30 and 40 mm
     assert_allclose(_rule(name, _pairs()), 0.096)
-    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.048 * 2**0.5)
+    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.096)
     low = _pairs(height_1=3.0, storeys_1=1.0)
     assert_allclose(_rule(name, low, 0.0, 0.02), 0.035)
 
