@@ -14,7 +14,12 @@ from per_obspy.pounding.history.relative import directional_relative_displacemen
 from per_obspy.records.text_table import read_columns
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.uncertainty import estimated, exact_demand
-from per_obspy.screening.uncertainty.exact_demand import node_demands, record_population
+from per_obspy.screening.uncertainty.exact_demand import (
+    node_demands,
+    nodes_suffice,
+    record_population,
+    resolved_probability,
+)
 from per_obspy.screening.uncertainty.nodes import NODES
 from per_obspy.screening.uncertainty.population import COLUMNS, chance_of_contact
 from per_obspy.screening.uncertainty.site_demand import pair_at_site
@@ -135,6 +140,42 @@ def test_against_monte_carlo(station, doubt):
         row = _table(station, [{**pair, "gap": gap}]).iloc[0]
         # 128 nodes are within 0.021 at 95 of 100 pairs; 20 000 samples within 0.004
         assert_allclose(row["probability"], share, atol=0.03)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.05, 1.3])
+@pytest.mark.parametrize("doubt", [0.1, 0.2, 0.3])
+def test_no_tail_is_passed_over(station, ratio, doubt):
+    # gaps that a few of 20 000 drawn buildings keep or close: 32 nodes, all on one side, said 1.000
+    # where 0.93 was true and `no` where 0.035 was
+    pair = {**EQUAL, "period_1": 0.8, "period_2": 0.8 * ratio, **AT_STATION}
+    pair |= {"period_log_std_1": doubt, "period_log_std_2": doubt}
+    period_1, period_2 = np.array([0.8, 0.8 * ratio])[:, None] * np.exp(
+        doubt * np.random.default_rng(8).normal(size=(2, 20_000))
+    )
+    motion = station["acceleration"].to_numpy().astype(np.float64)
+    demand = directional_relative_displacement(
+        *motion, 0.01, period_1, 0.05, period_2, 0.05, 30.0
+    ).one_before_two
+    shares = np.array([0.005, 0.02, 0.04, 0.93, 0.96, 0.98, 0.995])
+    gaps = np.quantile(demand, 1.0 - shares)
+    chance = _table(station, [{**pair, "gap": gap} for gap in gaps])["probability"].to_numpy()
+    # 128 nodes know a share of 0.04 within a standard deviation of 0.017 if they were random
+    assert_allclose(chance, shares, atol=0.03)
+    assert (chance < 0.999).all()
+    assert (chance[1:3] > 0.003).all()
+
+
+def test_what_nodes_can_show():
+    # 32 demands from 1 to 2 m, and gaps below, between, just above, and far above them
+    demands = np.tile(np.linspace(1.0, 2.0, 32), (5, 1))
+    gaps = np.array([0.0, 0.3, 1.5, 2.1, 4.1])
+    lowest, highest = resolved_probability(demands, gaps)
+    assert_allclose(lowest, [0.0, 0.0, 0.0, 0.5 / 33, 0.0])
+    assert_allclose(highest, [1.0, 1.0 - 0.3 / 33, 1.0, 1.0, 1.0])
+    assert_array_equal(nodes_suffice(demands, gaps), [True, True, False, False, True])
+    # lengths in another unit, and a pair that never moves apart
+    assert_array_equal(resolved_probability(1e3 * demands, 1e3 * gaps), (lowest, highest))
+    assert_array_equal(resolved_probability(0.0 * demands, gaps), ([0.0] * 5, [1.0] * 5))
 
 
 def _drawn_gap(mean, deviation, count, random):
