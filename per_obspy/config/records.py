@@ -5,11 +5,13 @@ from typing import Annotated, Self
 from pydantic import (
     Field,
     PlainSerializer,
+    field_validator,
     model_validator,
 )
 
 from per_obspy.config.section import Moment, RelativePath, Section
 from per_obspy.names import code_problem, public_url
+from per_obspy.units import motion_unit
 
 #: A provider of services, which records of a run show without user and password.
 Provider = Annotated[str, PlainSerializer(public_url)]
@@ -28,9 +30,7 @@ class Columns(Section):
     station: str = Field(description="SEED station code: letters, digits, - and _")
     latitude: float = Field(ge=-90, le=90, description="latitude of the station, degrees north")
     longitude: float = Field(ge=-180, le=180, description="longitude of the station, degrees east")
-    units: str = Field(
-        pattern="^(m/s2|cm/s2|gal|g)$", description="unit of the samples: m/s2, cm/s2, gal or g"
-    )
+    units: str = Field(description="unit of the samples: m/s2, cm/s2, gal or g")
     channels: dict[str, int] = Field(
         description="column of each channel, counted from 0: channel code = column"
     )
@@ -59,6 +59,15 @@ class Columns(Section):
             "channels = { CODE = 0 }; the last row may be shorter); not given: columns"
         ),
     )
+
+    @field_validator("units")
+    @classmethod
+    def _acceleration(cls, units: str) -> str:
+        unit = motion_unit(units)
+        if unit is None or unit.quantity != "acceleration":
+            problem = f"{units!r} is no unit of acceleration, such as m/s2, cm/s2, gal and g"
+            raise ValueError(problem)
+        return units
 
     @model_validator(mode="after")
     def _usable_codes(self) -> Self:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import GAL, STANDARD_GRAVITY
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.text.conversions import first_known, metres, utc, utc_from_words
 from per_obspy.formats.text.lines import (
     DECIMAL,
@@ -32,12 +32,15 @@ from per_obspy.formats.text.vocabulary import (
     orientation,
     trace,
 )
+from per_obspy.units import motion_unit
 
 _TITLE = re.compile(
     r"(Raw|Uncorrected|Corrected) (acceleration|velocity|displacement)\b.*"
     r"\(Format v0?1\.\d{1,4} with (\d{1,4}) text lines\)"
 )
-_FORMAT = re.compile(r"Format\s*+=\s*+\(\s*+(\d{1,4})([IFE])(\d{1,4})(?:\.\d{1,4})?\s*+\)")
+_FORMAT = re.compile(
+    r"Format\s*+=\s*+\(\s*+(\d{1,4})([IFE])(\d{1,4})(?:\.\d{1,4})?\s*+\)", re.IGNORECASE
+)
 _HEADER_NUMBERS = re.compile(r"\s*+100 (Integer|Real)-header values follow on\s++(\d{1,4}) lines")
 _COMMENTS = re.compile(r"\s*+(\d{1,4}) Comment line\(s\) follow")
 _SAMPLES = re.compile(
@@ -59,17 +62,6 @@ _ORIGIN = re.compile(
 _VS30 = re.compile(r"\bVs30\s*+[=:]?\s*+(\d{2,4}(?:\.\d{0,3})?)\s*+m/s", re.IGNORECASE)
 _TEXT_LINES = 13
 _UNKNOWN = -999.0
-
-#: unit of the samples -> unit in SI, factor
-_UNITS = {
-    "counts": ("counts", 1.0),
-    "cm/sec2": ("m/s2", GAL),
-    "cm/sec/sec": ("m/s2", GAL),
-    "gal": ("m/s2", GAL),
-    "g": ("m/s2", STANDARD_GRAVITY),
-    "cm/sec": ("m/s", 0.01),
-    "cm": ("m", 0.01),
-}
 
 
 class _Header(NamedTuple):
@@ -166,7 +158,7 @@ def _numbers(text: Text, line: int, kind: str) -> tuple[FloatArray, int]:
     promised = _HEADER_NUMBERS.match(title)
     layout = _FORMAT.search(title)
     # The title names the kind of numbers and their FORTRAN format
-    if promised is None or layout is None or promised[1] != kind:
+    if promised is None or layout is None or promised[1].lower() != kind.lower():
         problem = f"{quoted(text, line, 60)} does not announce its values and format"
         refuse(text, line, field, problem)
     return _block(text, line, 100, layout)
@@ -180,19 +172,22 @@ def _block(text: Text, line: int, numbers: int, layout: re.Match[str]) -> tuple[
     return values, line + 1 + block_lines(numbers, per_line)
 
 
-def _unit_name(text: Text, line: int) -> str:
-    """Return the unit that the line above the samples announces."""
+def _unit(text: Text, line: int) -> tuple[str, float]:
+    """Return unit in SI, or counts, and factor of the samples, from the line above them."""
     announced = _SAMPLES.match(text.lines[line])
-    name = announced[3].lower() if announced else ""
-    if name not in _UNITS:
-        problem = f"{quoted(text, line, 70)} is none of {', '.join(_UNITS)}"
+    name = announced[3] if announced else ""
+    if name.lower().rstrip(". ") in ("counts", "count"):
+        return "counts", 1.0
+    unit = motion_unit(name)
+    if unit is None:
+        problem = f"{quoted(text, line, 70)} is none of counts, g, gal, cm/sec2, cm/sec, cm"
         refuse(text, line, "units", problem)
-    return name
+    return unit.name, unit.factor
 
 
 def _samples(text: Text, line: int) -> tuple[str, FloatArray, int]:
     """Return the unit in SI, the samples in it, and the line after them."""
-    unit, factor = _UNITS[_unit_name(text, line)]
+    unit, factor = _unit(text, line)
     announced = _SAMPLES.match(text.lines[line])
     layout = _FORMAT.search(text.lines[line])
     if announced is None or layout is None:
@@ -214,7 +209,7 @@ def _peak(text: Text, header: _Header) -> float | None:
     peak = _real(header, 63)
     if peak is None:
         return None
-    _, factor = _UNITS[_unit_name(text, header.next_line)]
+    _, factor = _unit(text, header.next_line)
     return abs(peak) * factor
 
 

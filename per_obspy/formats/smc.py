@@ -80,13 +80,24 @@ def _samples(
 
 def _film(text: Text, first: int, samples: int) -> Film:
     """Return a digitised trace, whose header counts the pairs or the numbers in them."""
-    # The length of the file decides which of both it counts
-    lines = len(text.lines) - first
-    if samples % 2 == 0 and lines == block_lines(samples, 8) != block_lines(2 * samples, 8):
+    # The length of the file decides which of both it counts; most files of the USGS have a line
+    # more, whose times come after a pause
+    lines, of_numbers, of_pairs = (
+        len(text.lines) - first,
+        block_lines(samples, 8),
+        block_lines(2 * samples, 8),
+    )
+    if samples % 2 == 0 and lines in (of_numbers, of_numbers + 1) and lines < of_pairs:
         samples //= 2
     pairs = fixed_block(text, first, 2 * samples, 10, 8).reshape(-1, 2)
-    no_more(text, first + block_lines(2 * samples, 8), samples)
-    return even_film(text, first, pairs, 4)
+    end = first + block_lines(2 * samples, 8)
+    has_line_more = len(text.lines) == end + 1
+    if not has_line_more:
+        no_more(text, end, samples)
+    film = even_film(text, first, pairs, 4)
+    if has_line_more:
+        film.words["notes"].append("a line after the last pair is left out")
+    return film
 
 
 def _quantity(title: str) -> dict[str, Any]:

@@ -22,15 +22,12 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.event import Event
 
-from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, PerError, RecordRejected, Rejection
 from per_obspy.records.contents.metadata_files import merged_inventory
 from per_obspy.records.folder import SourceContents
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import LARGEST_UNPACKED, read_bytes_with_obspy
-
-#: unit of the samples according to the provenance -> m/s2
-_UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
+from per_obspy.units import motion_unit
 
 #: First bytes of an HDF5 file, which every ASDF file is.
 ASDF_MARK = b"\x89HDF\r\n\x1a\n"
@@ -253,11 +250,12 @@ def _output_unit(file: netCDF4.Dataset, trace: Trace, name: str) -> float:
     provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
     steps = "" if provenance is None else _bytes(provenance).decode("utf-8", "replace")
     units = _OUTPUT_UNITS.findall(steps)
+    unit = motion_unit(units[-1]) if units else None
     # A unit that is missing or unknown must not be guessed
-    if not units or units[-1] not in _UNITS:
-        unit = units[-1] if units else "no unit"
-        raise RecordRejected(trace.id, f"its provenance gives {unit} as output_units")
-    return _UNITS[units[-1]]
+    if unit is None or unit.quantity != "acceleration":
+        name = units[-1] if units else "no unit"
+        raise RecordRejected(trace.id, f"its provenance gives {name} as output_units")
+    return unit.factor
 
 
 def _auxiliary(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:

@@ -262,6 +262,7 @@ def _read(path: Path) -> _Grid:
     # Every row has its node's coordinates
     if missing := [name for name in ("LON", "LAT") if name not in columns]:
         raise CatalogError(source, f"has no field {', '.join(missing)}, only {', '.join(columns)}")
+    columns["LON"] = _unbroken(columns["LON"])
     # Rows from south to north, in each from west to east
     order = np.lexsort((columns["LON"], columns["LAT"]))
     shaped = {name: values[order].reshape(size) for name, values in columns.items()}
@@ -379,7 +380,7 @@ def _axes(
     source: str, longitude: FloatArray, latitude: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the two axes of a table sorted by latitude, then longitude."""
-    _require_within(source, "LON", longitude, 360.0)
+    _require_within(source, "LON", longitude, 540.0)
     _require_within(source, "LAT", latitude, 90.0)
     east, north = longitude[0], latitude[:, 0]
     # All rows have the same longitudes, all columns the same latitudes
@@ -389,6 +390,17 @@ def _axes(
     if not regular or not rising or east[-1] - east[0] >= 360.0:
         raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
     return east, north
+
+
+def _unbroken(longitude: FloatArray) -> FloatArray:
+    """Return longitudes in which those west of the widest hole go on beyond 180 or 360 degrees."""
+    east = np.unique(longitude)
+    steps = np.diff(east)
+    hole = int(steps.argmax()) if steps.size else 0
+    # The hole of other maps lies between their last longitude and the first one
+    if not steps.size or steps[hole] <= east[0] + 360.0 - east[-1]:
+        return longitude
+    return np.where(longitude <= east[hole], longitude + 360.0, longitude)
 
 
 def _require_within(source: str, name: str, degrees: FloatArray, limit: float) -> None:

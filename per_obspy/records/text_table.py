@@ -8,13 +8,10 @@ from obspy import Stream, UTCDateTime
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.formats.text.lines import LONGEST_NUMBER
 from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
-
-#: unit of a table -> m/s2
-TABLE_UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
+from per_obspy.units import motion_unit
 
 #: last letter of a SEED channel code -> orientation
 _LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
@@ -60,7 +57,7 @@ def read_columns(
     latitude, longitude : float
         Of the station, degrees.
     units : str
-        Of the samples: one of ``m/s2``, ``cm/s2``, ``gal``, ``g``.
+        Of the samples, an acceleration: ``m/s2``, ``cm/s^2``, ``gal``, ``g`` and so on.
     channels : mapping of str to int
         Channel code -> column, counted from 0.
     azimuths : mapping of str to float, optional
@@ -99,7 +96,8 @@ def read_columns(
         breaks the spacing; or if ``layout`` is not given and both layouts fit.
     """
     # Check the settings that do not depend on the file
-    _check_units_and_interval(units, time_column, dt)
+    factor = _checked_unit(units)
+    _check_interval(time_column, dt)
     _check_layout(layout, channels, time_column)
     site = _site(latitude, longitude)
     directions = _directions(channels, azimuths or {})
@@ -121,7 +119,7 @@ def read_columns(
     # One trace per channel, in m/s2
     stream = Stream()
     for code, column in channels.items():
-        samples = TABLE_UNITS[units] * _column(path, rows, column, code)
+        samples = factor * _column(path, rows, column, code)
         stream.append(trace(samples, step, common | directions[code] | {"channel": code}))
     return stream
 
@@ -137,10 +135,16 @@ def _check_layout(layout: str | None, channels: Mapping[str, int], time_column: 
         raise ValueError(f"layout = rows needs one channel, in column 0, got {dict(channels)}")
 
 
-def _check_units_and_interval(units: str, time_column: int | None, dt: float | None) -> None:
-    """Refuse an unknown unit, and an interval that is set twice or not at all."""
-    if units not in TABLE_UNITS:
-        raise ValueError(f"units must be one of {', '.join(TABLE_UNITS)}, got {units!r}")
+def _checked_unit(units: str) -> float:
+    """Return an acceleration unit in m/s2."""
+    unit = motion_unit(units)
+    if unit is None or unit.quantity != "acceleration":
+        raise ValueError(f"units must be one of m/s2, cm/s2, gal, g, got {units!r}")
+    return unit.factor
+
+
+def _check_interval(time_column: int | None, dt: float | None) -> None:
+    """Refuse an interval that is set twice or not at all."""
     if (time_column is None) == (dt is None):
         raise ValueError(
             f"exactly one of time_column and dt must be given, got {time_column} and {dt}"

@@ -2,6 +2,7 @@
 
 import io
 
+import numpy as np
 import pytest
 from format_samples import SAMPLES
 
@@ -48,3 +49,30 @@ def test_the_origin_time(origin: str, time: str | None):
 )
 def test_vs30_in_words(text: str, vs30: float | None):
     assert words(line(5), f"Coords: 60.9677 -144.6051  {text}").get("vs30") == vs30
+
+
+@pytest.mark.parametrize(
+    ("announced", "factor"),
+    # the sample has 0.01 m/s2 a unit; standard gravity by definition
+    [
+        ("units=g.     (02)Format=(8f9.6)", 980.665),
+        ("units=G (02),Format=(8F9.6)", 980.665),
+        ("units=gal.(05), Format=(8F9.6)", 1.0),
+        ("units=cm/sec/sec (04),Format=(8F9.6)", 1.0),
+        ("units=m/s^2 (04),Format=(8F9.6)", 100.0),
+        ("units=mg (04),Format=(8F9.6)", 0.980665),
+    ],
+)
+def test_units_and_formats_as_agencies_write_them(announced: str, factor: float):
+    title = next(line for line in TEXT.splitlines() if "units=" in line)
+    layout = title[title.index("units=") :]
+    width = layout[layout.index("(", layout.index("ormat")) :]
+    changed = title.replace(layout, announced.replace("(8f9.6)", width.lower()))
+    changed = changed.replace("(8F9.6)", width)
+    one, other = (
+        read_cosmos(io.BytesIO(text.encode("latin-1")))[0]
+        for text in (TEXT, TEXT.replace(title, changed))
+    )
+    # one product more is rounded
+    np.testing.assert_allclose(other.data, factor * one.data, rtol=1e-15)
+    assert (other.stats.units, other.stats.quantity) == ("m/s2", "acceleration")

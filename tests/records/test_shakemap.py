@@ -127,6 +127,25 @@ def test_the_date_line(tmp_path):
     assert grid["longitude"].values.tolist() == [179.5, 180.0, 180.5]
 
 
+@pytest.mark.parametrize(
+    ("longitudes", "axis"),
+    [
+        ((179.5, 180.0, -179.5), [179.5, 180.0, 180.5]),
+        ((179.0, -179.0, -178.5), [179.0, 181.0, 181.5]),
+        ((179.5, -180.0, -179.5), [179.5, 180.0, 180.5]),
+        ((359.5, 0.0, 0.5), [359.5, 360.0, 360.5]),
+        ((-120.0, -119.5, -119.0), [-120.0, -119.5, -119.0]),
+    ],
+)
+def test_a_map_across_the_date_line_is_one_piece(tmp_path, longitudes, axis):
+    grid = read_shakemap(
+        write(tmp_path / "grid.xml", grid_xml(FIELDS, make_rows(longitudes), (2, 3)))
+    )
+    assert grid["longitude"].values.tolist() == axis
+    # the values stay with their nodes: 10, 20, 30 % g from west to east in the northern row
+    assert_allclose(grid["psa"].sel(period=0.3, latitude=46.0) / 0.0980665, [10, 20, 30])
+
+
 def _changed(**changes):
     """Return rows with one value of the second row changed."""
     rows = [list(row) for row in make_rows()]
@@ -174,8 +193,8 @@ WRONG = {
         "LAT = 460 is not between -90 and 90",
     ),
     "far east": (
-        grid_xml(FIELDS, _changed(LON=361), (2, 3)),
-        "LON = 361 is not between -360 and 360",
+        grid_xml(FIELDS, _changed(LON=541), (2, 3)),
+        "LON = 541 is not between -540 and 540",
     ),
     "a node twice": (grid_xml(FIELDS, _changed(LON=10.0), (2, 3)), "do not form a grid"),
     "another unit": (

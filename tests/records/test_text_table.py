@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.records.text_table import TABLE_UNITS, read_columns
+from per_obspy.records.text_table import read_columns
 
 TABLE = """time NS EW V
 0.02 0.1 -0.2 0.3
@@ -44,9 +44,11 @@ def test_columns_become_channels_in_metres_per_second_squared(table: Path):
     assert [trace.stats.sensor_dip for trace in stream] == [0, 0, -90]
 
 
-@pytest.mark.parametrize("units", TABLE_UNITS)
+@pytest.mark.parametrize("units", ["m/s2", "cm/s2", "gal", "g", "m/s^2", "cm/sec/sec", "Gal"])
 def test_all_units_of_one_motion_agree(tmp_path: Path, units: str):
-    in_unit = {"m/s2": 9.80665, "cm/s2": 980.665, "gal": 980.665, "g": 1.0}[units]
+    in_unit = {"m": 9.80665, "c": 980.665, "gal": 980.665, "g": 1.0}[
+        units.lower() if "/" not in units else units[0]
+    ]
     (tmp_path / "one.csv").write_text(f"{in_unit}\n{-2 * in_unit}\n")
     layout = {
         "station": "A",

@@ -17,6 +17,7 @@ from per_obspy.formats.text.fields import (
 )
 from per_obspy.formats.text.lines import DECIMAL, Text, free_block, refuse
 from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
+from per_obspy.units import MotionUnit, motion_unit
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_/^]*:")
 _TIME = re.compile(rf"(\d{{4}})/?(\d\d)/?(\d\d)[ _]?(\d\d):?(\d\d):?{DECIMAL}")
@@ -25,17 +26,6 @@ _START = "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS"
 
 #: words for an unknown ground, in lower case
 _UNKNOWN = ("", "none", "unknown", "null", "nan", "-")
-
-#: unit of the header -> unit of the samples, factor
-_UNITS = {
-    "cm/s^2": ("m/s2", 0.01),
-    "m/s^2": ("m/s2", 1.0),
-    "cm/s": ("m/s", 0.01),
-    "m/s": ("m/s", 1.0),
-    "cm": ("m", 0.01),
-    "m": ("m", 1.0),
-}
-_QUANTITIES = {"m/s2": "acceleration", "m/s": "velocity", "m": "displacement"}
 
 #: last letter of the channel code -> orientation
 _DIRECTIONS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
@@ -47,14 +37,14 @@ def read_dyna_text(text: Text, first: int) -> Stream:
     fields = read_fields(text, stop)
     samples = count_field(text, fields, "NDATA")
     dt = interval_field(text, fields, "SAMPLING_INTERVAL_S")
-    unit, factor = _unit(text, fields)
-    values = factor * free_block(text, stop, None, samples)
+    unit = _unit(text, fields)
+    values = unit.factor * free_block(text, stop, None, samples)
     # Words of the header
-    words = _station(text, fields) | {"units": unit, "quantity": _QUANTITIES[unit]}
+    words = _station(text, fields) | {"units": unit.name, "quantity": unit.quantity}
     words["event"] = _event(text, fields)
     words |= _processing(text, fields) | _orientation(fields)
     words["starttime"] = _moment(text, fields, _START, text_field(fields, _START) or "")
-    words["header_peak"] = _peak(text, fields, unit)
+    words["header_peak"] = _peak(text, fields, unit.name)
     return Stream([trace(values, dt, words)])
 
 
@@ -68,17 +58,18 @@ def _header_end(text: Text, first: int) -> int:
     return stop
 
 
-def _unit(text: Text, fields: Fields) -> tuple[str, float]:
-    """Return the unit of the samples in SI and the factor to it; it must fit the quantity."""
-    unit = required_field(text, fields, "UNITS")
+def _unit(text: Text, fields: Fields) -> MotionUnit:
+    """Return the unit of the samples, which must fit the quantity."""
+    field = required_field(text, fields, "UNITS")
     kind = required_field(text, fields, "DATA_TYPE")
-    if unit.value not in _UNITS:
-        refuse(text, unit.line, "UNITS", f"{unit.value!r} is none of {', '.join(_UNITS)}")
-    name, factor = _UNITS[unit.value]
+    unit = motion_unit(field.value)
+    if unit is None:
+        refuse(text, field.line, "UNITS", f"{field.value!r} is none of cm/s^2, m/s^2, g, cm/s, cm")
     # A spectrum, for example, is in a unit of a quantity without being its time series
-    if kind.value.lower() != _QUANTITIES[name]:
-        refuse(text, kind.line, "DATA_TYPE", f"{kind.value!r} is not a time series in {unit.value}")
-    return name, factor
+    if kind.value.lower() != unit.quantity:
+        problem = f"{kind.value!r} is not a time series in {field.value}"
+        refuse(text, kind.line, "DATA_TYPE", problem)
+    return unit
 
 
 def _peak(text: Text, fields: Fields, unit: str) -> float | None:
