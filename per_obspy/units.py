@@ -67,6 +67,7 @@ def motion_unit(text: str) -> MotionUnit | None:
     word = re.sub(r"\s", "", text).lower().replace("²", "2").replace("−", "-").rstrip(".")
     if word in _ACCELERATIONS:
         return MotionUnit("m/s2", "acceleration", _ACCELERATIONS[word])
+    # A length, over one second or two
     match = _MOTION.fullmatch(word)
     if match is None:
         return None

@@ -175,6 +175,7 @@ def _block(text: Text, line: int, numbers: int, layout: re.Match[str]) -> tuple[
 def _unit(text: Text, line: int) -> tuple[str, float]:
     """Return unit in SI, or counts, and factor of the samples, from the line above them."""
     announced = _SAMPLES.match(text.lines[line])
+    # Agencies write g, G and g.
     name = announced[3] if announced else ""
     if name.lower().rstrip(". ") in ("counts", "count"):
         return "counts", 1.0

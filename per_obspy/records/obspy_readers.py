@@ -54,6 +54,10 @@ _TWO_FILES = ("Q",)
 #: first bytes of a packed file -> its decompressor
 _UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
 
+#: Lines of a plain table that may hold titles, and a line of numbers.
+TITLES = 8
+_NUMBERS = re.compile(r"\s*+(?:[-+]?[\d.]++(?:[eEdD][-+]?\d++)?[\s,;]*+)++")
+
 #: Largest size of an unpacked file: a day of three components at 200 Hz as text has 400 MB.
 LARGEST_UNPACKED = 512 * 1024**2
 
@@ -200,7 +204,16 @@ def _unknown(content: bytes) -> str:
     """Return the reason why no format is found; an archive is opened by its name only."""
     if zipfile.is_zipfile(BytesIO(content)) or tarfile.is_tarfile(BytesIO(content)):
         return "it is an archive: its name must end with .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz"
-    return f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
+    problem = f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
+    if _has_plain_numbers(content):
+        return f"{problem}; a table of samples is read where [[records.columns]] describes it"
+    return problem
+
+
+def _has_plain_numbers(content: bytes) -> bool:
+    """Return whether lines of numbers alone follow the first lines of a text."""
+    lines = content[:4096].decode("ascii", "replace").splitlines()[TITLES:-1]
+    return len(lines) > 1 and all(map(_NUMBERS.fullmatch, lines))
 
 
 def _reason(error: Exception) -> str:

@@ -190,3 +190,22 @@ def test_any_error_is_a_rejection_on_one_line(content: bytes, options: dict, rea
     with pytest.raises(RecordRejected, match=reason) as rejection:
         read_bytes_with_obspy(reader, content, "service", **options)
     assert "\n" not in str(rejection.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        # Canterbury's text files: two lines of words, then six samples to a line
+        (
+            "REHS 090 title\n 1000 0.005 0 0 -1.0 0 0 0\n",
+            " 1.2345e-02 -3.4e-02 5.0e-01 0.1 0.2 0.3\n",
+        ),
+        ("", "0.01\t-0.002\t0.003\n"),
+        ("time;north\n", "0,01;-0,002\n"),
+        ("", "1.5\n"),
+    ],
+)
+def test_plain_numbers_are_sent_to_their_configuration(tmp_path: Path, head: str, row: str):
+    (tmp_path / "REHS.090").write_text(head + 400 * row)
+    with pytest.raises(RecordRejected, match=r"\[\[records.columns\]\]"):
+        read_with_obspy(obspy.read, tmp_path / "REHS.090")
