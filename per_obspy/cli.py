@@ -21,7 +21,6 @@ from per_obspy.commands.init import init, warm_up
 from per_obspy.commands.operation.status import status
 from per_obspy.commands.operation.watch import watch
 from per_obspy.commands.pairs import catalog, pairs
-from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
@@ -63,7 +62,7 @@ app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
     *(run, init, warm_up, simulate, process, spectra, screen),
-    *(report, show, plan, events, fetch, info, watch, status),
+    *(report, show, events, fetch, info, watch, status),
 )
 for command in COMMANDS:
     app.command()(command)

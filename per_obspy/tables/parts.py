@@ -42,11 +42,6 @@ _PART = "order_part"
 _ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 
-def some_columns(table: Dataset, names: Sequence[str]) -> Dataset:
-    """Return some columns of Parquet files, so that equal names of other columns do not matter."""
-    return table.replace_schema(pa.schema([table.schema.field(name) for name in names]))
-
-
 @contextmanager
 def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     """

@@ -1,1 +1,0 @@
-"""Order of visits to buildings after an earthquake: routes, and their files."""
