@@ -196,7 +196,9 @@ def _read_file(path: Path, limits: Archives) -> _File:
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
         if file.kind == "station text":
-            return file._replace(inventory=read_station_text(path, content))
+            inventory, faults = read_station_text(path, content)
+            rejection = _rejected_file(path, RecordRejected(str(path), *faults)) if faults else None
+            return file._replace(inventory=inventory, rejection=rejection)
         if file.kind == "station table":
             return file._replace(rows=read_station_table(str(path), content))
         if file.kind == "ITACA metadata":

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
-from obspy import Inventory, Stream, UTCDateTime
+from obspy import Inventory, Stream, UTCDateTime, read
 from obspy.core.event import Catalog, Event, Origin
 from obspy.geodetics import locations2degrees
 
@@ -316,6 +316,31 @@ def shortened(handler: _Handler, body: bytes) -> None:
 def content(wrong: bytes) -> Fault:
     """Answer 200 with a web page."""
     return lambda handler, _: handler.reply(200, wrong)
+
+
+def changed(change: Callable[[Stream], Stream]) -> Fault:
+    """Send records that a service has confused in some way."""
+
+    def answer(handler: _Handler, body: bytes) -> None:
+        whole(handler, mseed(change(read(BytesIO(body)))) if body else body)
+
+    return answer
+
+
+def moved(seconds: float, channels: str = "*") -> Callable[[Stream], Stream]:
+    """Return a change that moves the records of some channels in time, s."""
+
+    def move(stream: Stream) -> Stream:
+        for trace in stream.select(channel=channels):
+            trace.stats.starttime += seconds
+        return stream
+
+    return move
+
+
+def empty(handler: _Handler, _: bytes) -> None:
+    """Answer 200 without content, as a service whose archive is away does."""
+    handler.reply(200, b"")
 
 
 def unframed(part: float) -> Fault:
