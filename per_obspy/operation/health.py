@@ -14,6 +14,9 @@ from per_obspy.resume import read_status as read_record
 #: Record of a run in its folder.
 RECORD = "run.json"
 
+#: Ignored earthquakes that are printed; ``status --json`` has up to 1000.
+SHOWN = 50
+
 #: s that work may last beyond the time at which a watcher is due.
 LATE = 900.0
 
@@ -82,6 +85,9 @@ def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
         f"events open: {status.events_open}",
         f"next due: {status.next_due or 'never'}" + (f", {behind:.0f} s ago" if behind > 0 else ""),
     ]
+    if status.ignored:
+        lines.append(f"events ignored: {len(status.ignored)}, the latest first")
+        lines += [f"  {line}" for line in status.ignored[: -SHOWN - 1 : -1]]
     if status.last_error:
         lines.append(f"last error: {status.last_error} ({status.failures} in succession)")
     if status.last_notification_error:

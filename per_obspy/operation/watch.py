@@ -292,6 +292,9 @@ def _ended(
         last_notification_error=undelivered(
             event_folder(watcher.folder, event_id) / WORK for event_id in states
         ),
+        ignored=tuple(
+            f"{shortened(name, 80)}: {line}" for name, (_, line) in state.ignored.items()
+        ),
         running=running,
     )
     write_status(watcher.folder, status)

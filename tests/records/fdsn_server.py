@@ -169,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
                 if _is_listed(event, parameters, self.server.updated.get(name))
             }
             limit = int(parameters.get("limit", len(listed)))
-            return _event_text(dict(list(listed.items())[:limit])).encode()
+            return event_text(dict(list(listed.items())[:limit])).encode()
         if parameters["eventid"] not in events:
             return b""
         content = BytesIO()
@@ -214,7 +214,7 @@ def _degrees(origin: Origin, parameters: dict[str, str]) -> float:
     return float(locations2degrees(origin.latitude, origin.longitude, *centre))
 
 
-def _event_text(events: dict[str, Event]) -> str:
+def event_text(events: dict[str, Event]) -> str:
     """Return a list of events, as the text format has it."""
     head = "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID"
     rows = [f"{head}|MagType|Magnitude|MagAuthor|EventLocationName"]

@@ -238,7 +238,9 @@ def _others(found: SourceContents, wanted: Wanted) -> list[Rejection]:
         if problem:
             reason = f"its file in the cache holds records {problem}: asked for {asked_for(wanted)}"
             reason = f"{reason}; remove the file, and it is fetched again"
-            rows.setdefault(station, Rejection("station", station, str(record.path), None, (reason,)))
+            rows.setdefault(
+                station, Rejection("station", station, str(record.path), None, (reason,))
+            )
     return list(rows.values())
 
 
@@ -294,9 +296,7 @@ def _offers(
     return offers, rejected, unusable
 
 
-def _listed(
-    pool: WebPool, url: str, wanted: Wanted
-) -> tuple[list[StationLine], list[Rejection]]:
+def _listed(pool: WebPool, url: str, wanted: Wanted) -> tuple[list[StationLine], list[Rejection]]:
     """
     Return the channels that a service lists of a request, and its lines that cannot be used.
 
@@ -309,7 +309,9 @@ def _listed(
     try:
         lines, faults = station_lines(content)
     except ValueError as error:
-        raise ServiceError(f"{shown}: answers with data other than a station list: {error}") from error
+        raise ServiceError(
+            f"{shown}: answers with data other than a station list: {error}"
+        ) from error
     rejected = [
         Rejection("station", fault.name, shown, fault.number, (fault.reason,)) for fault in faults
     ]

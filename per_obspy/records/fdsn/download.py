@@ -279,7 +279,9 @@ def _without_others(content: bytes, wanted: Wanted) -> bytes:
 
 def _other(records: Records, url: str, wanted: Wanted) -> RecordRejected:
     """Return the error of an answer that holds nothing that was asked for."""
-    found = "; ".join(f"{row.name} {row.reasons[0].partition(', are')[0]}" for row in records.left_out)
+    found = "; ".join(
+        f"{row.name} {row.reasons[0].partition(', are')[0]}" for row in records.left_out
+    )
     return RecordRejected(public_url(url), f"answers with {found}: asked for {asked_for(wanted)}")
 
 

@@ -278,7 +278,7 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
         if time.monotonic() > until:
             raise ServiceError(f"{shown}: no whole answer within {pool.longest:g} s")
     if not content or content.isspace():
-        reason = "an empty answer (HTTP 200), which is not \"no data\" (HTTP 204)"
+        reason = 'an empty answer (HTTP 200), which is not "no data" (HTTP 204)'
         raise EmptyAnswer(f"{shown}: {reason}: asked again later")
     names = {name.lower() for name in response.headers}
     is_framed = bool(names & {"content-length", "transfer-encoding"})

@@ -142,7 +142,10 @@ def test_stray_records_are_left_out_and_the_rest_is_kept(server, wanted, tmp_pat
 def test_a_channel_of_which_only_another_time_comes_costs_no_other(server, wanted, tmp_path):
     server.fail("dataselect", "S001", *[changed(moved(-YEAR, "HNZ"))] * 2)
     assert download(wanted, tmp_path, server.url) == ("XX.S001", (), True)
-    assert {trace.stats.channel for trace in read(str(tmp_path / "XX.S001.mseed"))} == {"HNE", "HNN"}
+    assert {trace.stats.channel for trace in read(str(tmp_path / "XX.S001.mseed"))} == {
+        "HNE",
+        "HNN",
+    }
 
 
 def test_a_channel_that_is_empty_costs_no_other(server, wanted, tmp_path: Path):
@@ -169,18 +172,29 @@ def xml(server: FdsnServer, change: Callable[[Station], object]) -> bytes:
 
 
 def changed_channels(**values: object) -> Callable[[Station], object]:
-    return lambda station: [setattr(channel, *value) for channel in station for value in values.items()]
+    return lambda station: [
+        setattr(channel, *value) for channel in station for value in values.items()
+    ]
 
 
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (changed_channels(end_date=UTCDateTime(1995, 1, 1)), "metadata of another time, 1990-01-01"),
-        (changed_channels(start_date=UTCDateTime(2010, 1, 1)), "metadata of another time, 2010-01-"),
+        (
+            changed_channels(end_date=UTCDateTime(1995, 1, 1)),
+            "metadata of another time, 1990-01-01",
+        ),
+        (
+            changed_channels(start_date=UTCDateTime(2010, 1, 1)),
+            "metadata of another time, 2010-01-",
+        ),
         (changed_channels(code="BHZ"), "metadata of another channel, .BHZ"),
         (lambda station: station.channels.clear(), "metadata without a channel"),
         (lambda station: setattr(station, "longitude", 100.0), ", 100, outside the circle"),
-        (lambda station: setattr(station, "code", "S002"), "answers with XX.S002 instead of XX.S001"),
+        (
+            lambda station: setattr(station, "code", "S002"),
+            "answers with XX.S002 instead of XX.S001",
+        ),
     ],
 )
 def test_metadata_other_than_asked_for_are_refused(server, wanted, tmp_path, change, reason):
