@@ -20,8 +20,8 @@ from per_obspy.records.asdf import (
     is_asdf,
     read_asdf_station,
 )
-from per_obspy.records.metadata import metadata_text
 from per_obspy.records.event_file import read_event
+from per_obspy.records.metadata import metadata_text
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 PROCESSED = json.dumps({"standard": {"process_level": "corrected physical units"}})

@@ -21,8 +21,10 @@ from per_obspy.records.earthquakes.groups import (
     EventGroup,
     RecordSpan,
     chosen_group,
+    differ_by_clocks,
     event_groups,
     follows,
+    joining_gap,
     station_files,
 )
 from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
@@ -47,8 +49,10 @@ class OneEarthquake(NamedTuple):
         only a window is read.
     earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
-        (records without a date that are taken for this earthquake), ``screened``, and ``headers``:
-        the earthquake by the headers of its records, see ``earthquakes.header_event``.
+        (records without a date that are taken for this earthquake), ``screened``, ``headers``: the
+        earthquake by the headers of its records, see ``earthquakes.header_event``; and
+        ``joined_by``: the ``records.event_gap``, s, that takes a group for the screened earthquake,
+        from which it may differ by its clocks only; else None.
     """
 
     contents: tuple[tuple[SourceContents, Reader], ...]
@@ -80,14 +84,21 @@ def one_earthquake(
     reader = _reader(records.archives)
     motion = partial(largest_motion, found, reader)
     group = chosen_group(groups, time, source, motion, records.event_gap)
-    facts = [_facts(other, is_screened=other is group) for other in groups]
+    alike = differ_by_clocks(groups, group)
+    gap = joining_gap([group, *alike])
+    facts = [
+        {**_facts(other, is_screened=other is group), "joined_by": gap if other in alike else None}
+        for other in groups
+    ]
     # Without an event of the configuration that of the headers counts
     if event is None:
         reader = reader_of_event(reader, group_event(group, records.event_gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
-    rejected = (*found.rejected, *(_rejection(record, group) for record in others))
+    by_clock = {record.key: gap for other in alike for record in other.records}
+    rows = [_rejection(record, group, by_clock.get(record.key)) for record in others]
+    rejected = (*found.rejected, *rows)
     mixed = {record.path for record in others}
     found = found._replace(rejected=rejected)
     return OneEarthquake(_contents(found, group, mixed, reader), facts)
@@ -203,10 +214,16 @@ def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
     return {"start": window[0] - MARGIN, "end": window[1] + MARGIN}
 
 
-def _rejection(record: RecordSpan, screened: EventGroup) -> Rejection:
-    """Return the row of a record of another earthquake."""
+def _rejection(record: RecordSpan, screened: EventGroup, gap: float | None) -> Rejection:
+    """Return the row of a record of another earthquake, or of another clock if a gap joins it."""
     start = str(record.start)[:16] if record.is_dated else "without a date"
     reason = f"belongs to another earthquake: starts {start}, the screened one {screened.label}"
+    if gap is not None:
+        reason = (
+            f"starts {start}, the screened records {screened.label}: another earthquake, or the "
+            "same by a clock that differs, as no station has records of both; records.event_gap = "
+            f"{gap:g} takes them as one"
+        )
     return Rejection("record", record.record, str(record.path), None, (reason,))
 
 

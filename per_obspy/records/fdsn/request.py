@@ -12,7 +12,6 @@ from obspy.geodetics import kilometers2degrees, locations2degrees
 from per_obspy import config
 from per_obspy.errors import CatalogError
 
-
 #: Time of an answer before and after the window that is no fault, s: services cut at whole MiniSEED
 #: records (reasoned: those of strong motion are shorter).
 MARGIN = 60.0

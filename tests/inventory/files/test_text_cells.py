@@ -25,7 +25,9 @@ def test_columns_and_single_texts_agree():
 def test_a_text_is_read_as_it_was_but_for_unprintable_characters(text):
     assert given_text(cell(text)) == cell("x" + text)[1:]
     is_number = cell(text).lstrip("+-")[:1].isascii() and cell(text).lstrip("+-")[:1].isdecimal()
-    assert is_number or not cell(text).strip().startswith(("=", "+", "-", "@", "|", "\uff1d", "\uff5c"))
+    assert is_number or not cell(text).strip().startswith(
+        ("=", "+", "-", "@", "|", "\uff1d", "\uff5c")
+    )
 
 
 def test_numbers_and_empty_cells_stay():
