@@ -113,7 +113,22 @@ def compare_outputs(statuses: Mapping[Path, Status], seconds: float) -> Comparis
     seconds : float
         Longest time, s: what is left then, of outputs of any size, is not compared.
     """
-    until, changed, sizes = time.monotonic() + seconds, list[Path](), dict[Path, tuple[int, str]]()
+    until, changed, compared = time.monotonic() + seconds, list[Path](), 0
+    sizes = _sizes(statuses)
+    for file, (size, digest) in sorted(sizes.items(), key=lambda item: item[1][0]):
+        found = _hash_until(file, until) if size >= 0 else ""
+        # The time is over
+        if found is None:
+            break
+        compared += 1
+        if found != digest or size < 0:
+            changed.append(file)
+    return Comparison(tuple(changed), compared, len(sizes))
+
+
+def _sizes(statuses: Mapping[Path, Status]) -> dict[Path, tuple[int, str]]:
+    """Return size, bytes, and hash of every output; -1 for one that is missing or no file."""
+    sizes = dict[Path, tuple[int, str]]()
     for path, status in statuses.items():
         for name, digest in status["outputs"].items():
             file = path.parent / str(name)
@@ -123,15 +138,7 @@ def compare_outputs(statuses: Mapping[Path, Status], seconds: float) -> Comparis
                 sizes[file] = (file.stat().st_size if is_whole else -1, str(digest))
             except OSError:
                 sizes[file] = (-1, "")
-    compared = 0
-    for file, (size, digest) in sorted(sizes.items(), key=lambda item: item[1][0]):
-        found = _hash_until(file, until) if size >= 0 else ""
-        if found is None:
-            break
-        compared += 1
-        if found != digest or size < 0:
-            changed.append(file)
-    return Comparison(tuple(changed), compared, len(sizes))
+    return sizes
 
 
 def _hash_until(path: Path, until: float) -> str | None:

@@ -365,6 +365,7 @@ def _left_out_lines(screened: dict[str, Any], groups: "Sequence[dict[str, Any]]"
         others = ", ".join(group["start"] for group in apart)
         facts = f"{screened['stations']} stations; others, left out: {others}"
         lines.append(f"Records of {len(apart) + 1} earthquakes: {screened['start']}, {facts}")
+    # Both may be true of one folder
     if clocks:
         starts = ", ".join(f"{group['start']} ({group['stations']} stations)" for group in clocks)
         lines.append(

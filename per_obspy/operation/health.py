@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from per_obspy.errors import CatalogError
 from per_obspy.operation.status import STATUS, WatchStatus, read_status
-from per_obspy.resume import Status, StatusError, compare_outputs
+from per_obspy.resume import Comparison, Status, StatusError, compare_outputs
 from per_obspy.resume import read_status as read_record
 
 #: Record of a run in its folder.
@@ -90,23 +90,31 @@ def _with_comparison(health: Health, files: Sequence[Path]) -> Health:
     if not statuses and not unreadable:
         return health
     comparison = compare_outputs(statuses, COMPARED_WITHIN)
-    lines = [f"damaged: {file}: is not as it was written" for file in comparison.changed[:SHOWN]]
-    if len(comparison.changed) > SHOWN:
-        lines.append(f"damaged: {len(comparison.changed) - SHOWN} further files")
-    count = f"results: {comparison.compared} of {comparison.files} files compared"
-    if comparison.compared < comparison.files:
-        count += f" within {COMPARED_WITHIN:g} s, the largest are not"
     # Whatever else is wrong needs a person first
     is_damaged = bool(unreadable or comparison.changed)
     state = "damaged" if is_damaged and health.state in ("fine", "late") else health.state
-    first = health.lines[0].replace(health.state, state)
     facts = {
         **health.facts,
         "state": state,
         "damaged": [str(file) for file in comparison.changed],
         "compared": [comparison.compared, comparison.files],
     }
-    return Health(state, (first, *health.lines[1:], count, *unreadable, *lines), facts)
+    # The first line names the state
+    first = health.lines[0].replace(health.state, state)
+    lines = (first, *health.lines[1:], *_comparison_lines(comparison), *unreadable)
+    return Health(state, lines, facts)
+
+
+def _comparison_lines(comparison: Comparison) -> list[str]:
+    """Return the outcome of a comparison in words."""
+    # Huge results take longer than a check of health may
+    lines = [f"results: {comparison.compared} of {comparison.files} files compared"]
+    if comparison.compared < comparison.files:
+        lines[0] += f" within {COMPARED_WITHIN:g} s, the largest are not"
+    lines += [f"damaged: {file}: is not as it was written" for file in comparison.changed[:SHOWN]]
+    if len(comparison.changed) > SHOWN:
+        lines.append(f"damaged: {len(comparison.changed) - SHOWN} further files")
+    return lines
 
 
 def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
@@ -126,15 +134,21 @@ def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
         f"events open: {status.events_open}",
         f"next due: {status.next_due or 'never'}" + (f", {behind:.0f} s ago" if behind > 0 else ""),
     ]
-    if status.ignored:
-        lines.append(f"events ignored: {len(status.ignored)}, the latest first")
-        lines += [f"  {line}" for line in status.ignored[: -SHOWN - 1 : -1]]
+    lines += _ignored_lines(status)
     if status.last_error:
         lines.append(f"last error: {status.last_error} ({status.failures} in succession)")
     if status.last_notification_error:
         lines.append(f"notification: {status.last_notification_error}")
     lines.append(f"process: {status.pid} on {status.host}, per_obspy {status.version}")
     return Health(state, tuple(lines), {"state": state, **status.model_dump(mode="json")})
+
+
+def _ignored_lines(status: WatchStatus) -> list[str]:
+    """Return the earthquakes without runs, the latest first; none if there are none."""
+    if not status.ignored:
+        return []
+    latest = status.ignored[: -SHOWN - 1 : -1]
+    return [f"events ignored: {len(status.ignored)}", *(f"  {line}" for line in latest)]
 
 
 def _seconds_behind(due: str | None, now: datetime) -> float:

@@ -107,6 +107,7 @@ def read_sds_station(
     station without samples in the window.
     """
     usable, others = list[Path](), list[Rejection]()
+    # Names of files are the index of an archive
     for path in paths:
         reason = _other_than_named(path)
         if reason:
@@ -136,5 +137,6 @@ def _other_than_named(path: Path) -> str:
     spans = [(trace.stats.starttime, trace.stats.endtime) for trace in traces]
     if any(start < midnight + 2 * _DAY and end > midnight - _DAY for start, end in spans):
         return ""
-    first, last = min(start for start, _ in spans), max(end for _, end in spans)
+    first = min(start for start, _ in spans)
+    last = max(end for _, end in spans)
     return f"holds records of {first} to {last} under the name of another day"

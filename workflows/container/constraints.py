@@ -50,7 +50,7 @@ def tested_versions() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    print("# Versions with which container and CI are tested, by `make constraints`; see constraints.py.")
+    print("# Versions with which container and CI are tested, by `make constraints`.")
     print(f"# Linux, Python {sys.version_info[0]}.{sys.version_info[1]} and newer.")
     for name, version in sorted(tested_versions().items()):
         print(f"{name}=={version}")

@@ -74,7 +74,7 @@ class LineFault(NamedTuple):
 
 
 def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
-    """
+    r"""
     Read every line of FDSN station text alone.
 
     Only codes, place and epoch are read: a fault in another column is none here.
@@ -97,18 +97,20 @@ def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
 
     Examples
     --------
-    >>> text = b"#Network|Station|Latitude|Longitude\\nXX|A|1.5|2.5\\nXX|B|nan|2.5\\nXX|C|1"
+    >>> text = b"#Network|Station|Latitude|Longitude\nXX|A|1.5|2.5\nXX|B|nan|2.5\nXX|C|1"
     >>> lines, faults = station_lines(text)
     >>> [line.station for line in lines]
     ['A']
     >>> faults[0].reason, faults[1].reason
     ("latitude: 'nan', expected a number from -90 to 90", 'has 3 columns, expected 4')
     """
+    # Services write the header with blanks or without
     first, *rest = _split(content)
     columns = [name.strip().lower() for name in first.lstrip("\ufeff# ").split("|")]
     if not set(_REQUIRED) <= set(columns):
         expected = "#Network|Station|Latitude|Longitude and others"
         raise ValueError(f"the first line is {shortened(first, 80)!r}, expected {expected}")
+    # Comments and empty lines are none
     lines, faults = list[StationLine](), list[LineFault]()
     for number, text in enumerate(rest, 2):
         if not text.strip() or text.startswith("#"):
@@ -117,11 +119,16 @@ def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
         try:
             lines.append(_line(number, columns, cells))
         except ValueError as error:
-            codes = dict(zip(columns, cells, strict=False))
-            names = ("network", "station", "location", "channel")
-            name = ".".join(codes[column] for column in names if column in codes)
-            faults.append(LineFault(number, shortened(name, 80), str(error)))
+            name = _codes(columns, cells)
+            faults.append(LineFault(number, name, str(error)))
     return lines, faults
+
+
+def _codes(columns: Sequence[str], cells: Sequence[str]) -> str:
+    """Return the codes of a wrong line, as far as it has them."""
+    codes = dict(zip(columns, cells, strict=False))
+    names = ("network", "station", "location", "channel")
+    return shortened(".".join(codes[name] for name in names if name in codes), 80)
 
 
 def _split(content: bytes) -> list[str]:
@@ -133,6 +140,7 @@ def _line(number: int, columns: Sequence[str], cells: Sequence[str]) -> StationL
     """Return a line; raise ``ValueError`` with column and value if it is wrong."""
     if len(cells) < len(columns):
         raise ValueError(f"has {len(cells)} columns, expected {len(columns)}")
+    # Columns beyond those of the header are nobody's
     row = dict(zip(columns, cells, strict=False))
     location, channel = row.get("location", ""), row.get("channel", "")
     if not row["station"] or ("channel" in columns and not channel):
@@ -152,6 +160,7 @@ def _line(number: int, columns: Sequence[str], cells: Sequence[str]) -> StationL
 
 def _degrees(row: dict[str, str], name: str) -> float:
     """Return a coordinate of a line."""
+    # Also refuses what is no number
     largest = _LARGEST[name]
     value = float(row[name]) if _NUMBER.fullmatch(row[name]) else math.nan
     if not abs(value) <= largest:

@@ -245,6 +245,7 @@ def present_event(watch: Watch, event_id: str, file: str, time: str) -> PresentE
     row = quakeml_row(event)._replace(event_id=event_id)
     if problem := row_problem(row):
         raise CatalogError(shortened(event_id, 80), problem)
+    # An update moves an origin by seconds
     if abs((moment(row.time) - moment(time)).total_seconds()) > OTHER_EVENT:
         source = public_url(watch.service or str(watch.folder))
         reason = f"answers for {shortened(event_id, 80)} with an earthquake of {row.time[:19]}"

@@ -98,11 +98,11 @@ def judged_feed(
     rows = list(feed.rows.values())
     oldest = now - timedelta(seconds=watch.oldest)
     judgement = list[Listed]()
-    for row, reason in zip(rows, judged(watch, places, rows), strict=True):
+    for row, irrelevance in zip(rows, judged(watch, places, rows), strict=True):
         # Old ones are listed where a watcher begins, or their magnitude is revised
-        if row.event_id not in states and moment(row.time) < oldest:
-            old = f"older than {watch.oldest:g} s (watch.oldest)"
-            reason = f"{old}; {reason}" if reason else old
+        is_old = row.event_id not in states and moment(row.time) < oldest
+        age = f"older than {watch.oldest:g} s (watch.oldest)" if is_old else ""
+        reason = "; ".join(filter(None, (age, irrelevance)))
         judgement.append(Listed(row, reason, feed.files.get(row.event_id, "")))
     return judgement
 
@@ -156,6 +156,7 @@ def ignored_events(
     files : container of str
         Names of the QuakeML files of the folder.
     """
+    # Those whose file is gone are gone
     ignored = {
         name: entry
         for name, entry in known.items()

@@ -166,6 +166,11 @@ class WatchState(_State):
     ignored: dict[str, tuple[str, str]] = Field(default_factory=dict)
 
 
+def ignored_lines(state: WatchState) -> tuple[str, ...]:
+    """Return one line per ignored earthquake: identifier, facts and reason."""
+    return tuple(f"{shortened(name, 80)}: {line}" for name, (_, line) in state.ignored.items())
+
+
 def moment(text: str) -> datetime:
     """
     Return a stored time; one without a zone is UTC.

@@ -2,6 +2,7 @@
 
 import logging
 import re
+from collections.abc import Mapping
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -109,25 +110,32 @@ def read_station_text(path: Path, content: bytes) -> tuple[Inventory, tuple[str,
     except ValueError:
         faults = {}  # a list of networks, or no list at all
     head, *lines = marked_open_starts(content).decode().split("\n")
-    numbered = {number: line for number, line in enumerate(lines, 2) if number not in faults}
+    numbered = {number: line for number, line in enumerate(lines, 2) if line.strip()}
+    for number in faults:
+        numbered.pop(number, None)
+    # Only where the whole cannot be read, line by line for columns that ObsPy alone reads
     try:
         inventory = _station_text(path, [head, *numbered.values()])
-    except RecordRejected as rejection:
-        # Columns that only ObsPy reads
-        for number, line in list(numbered.items()):
-            try:
-                _station_text(path, [head, line])
-            except RecordRejected as fault:
-                faults[number] = fault.reasons[0]
-                del numbered[number]
-        if not any(map(str.strip, numbered.values())):
-            reason = f"is no FDSN station text: {rejection.reasons[0]}"
-            raise RecordRejected(str(path), reason) from rejection
-        inventory = _station_text(path, [head, *numbered.values()])
-    reasons = tuple(f"line {number}: {faults[number]}" for number in sorted(faults))
-    if faults and not any(map(str.strip, numbered.values())):
+    except RecordRejected:
+        faults |= _faults_of_obspy(path, head, numbered)
+        good = [line for number, line in numbered.items() if number not in faults]
+        inventory = _station_text(path, [head, *good])
+    reasons = [f"line {number}: {faults[number]}" for number in sorted(faults)]
+    # A file of which nothing is left is none
+    if reasons and not any(inventory):
         raise RecordRejected(str(path), *(f"is no FDSN station text: {text}" for text in reasons))
-    return with_open_starts(inventory), reasons
+    return with_open_starts(inventory), tuple(reasons)
+
+
+def _faults_of_obspy(path: Path, head: str, lines: Mapping[int, str]) -> dict[int, str]:
+    """Return the number of each line that ObsPy refuses, and why."""
+    faults = dict[int, str]()
+    for number, line in lines.items():
+        try:
+            _station_text(path, [head, line])
+        except RecordRejected as rejection:
+            faults[number] = rejection.reasons[0]
+    return faults
 
 
 def _station_text(path: Path, lines: list[str]) -> Inventory:

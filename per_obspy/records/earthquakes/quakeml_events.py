@@ -40,6 +40,7 @@ def read_quakeml(path: Path) -> tuple[dict[str, Event], list[str]]:
         raise CatalogError(str(path), f"is no QuakeML: {'; '.join(error.reasons)}") from error
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+    # One earthquake without a place costs no other
     events, problems = dict[str, Event](), list[str]()
     for event in found:
         try:

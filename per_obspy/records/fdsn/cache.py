@@ -10,6 +10,7 @@ written when a request is complete.
 """
 
 from collections import defaultdict
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from pathlib import Path
@@ -205,23 +206,29 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
     names_with_records = _stems(fetched.folder, "*.mseed")
     names = names_with_records | _stems(fetched.folder, "*.json")
     damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
-    left_out = [row for name in sorted(names) for row in _left_out(fetched.folder, name)]
+    left_out = _left_out(fetched.folder, sorted(names))
     broken = {row.name for row in damaged}
     # Metadata alone are no station
     if names_with_records <= broken:
         return SourceContents({}, None, (*fetched.rejected, *damaged, *left_out))
     found = find_stations(fetched.folder)
-    inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
     others = _others(found, fetched.wanted)
-    broken |= {row.name for row in others}
+    usable = stations_inside(found.inventory or Inventory(), fetched.wanted) - broken
+    usable -= {row.name for row in others}
     # Half a file of a killed fetch has another stem
-    stations = {}
-    for name, paths in found.stations.items():
-        whole = tuple(path for path in paths if path.stem == name)
-        if whole and name in inside and name not in broken:
-            stations[name] = whole
+    stations = _whole_stations(found, usable)
     rejected = (*fetched.rejected, *damaged, *left_out, *others)
     return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _whole_stations(found: SourceContents, usable: set[str]) -> dict[str, tuple[Path, ...]]:
+    """Return the usable stations of a cache with their files, without half-written ones."""
+    files = {
+        name: tuple(path for path in paths if path.stem == name)
+        for name, paths in found.stations.items()
+        if name in usable
+    }
+    return {name: whole for name, whole in files.items() if whole}
 
 
 def _others(found: SourceContents, wanted: Wanted) -> list[Rejection]:
@@ -230,6 +237,7 @@ def _others(found: SourceContents, wanted: Wanted) -> list[Rejection]:
     for record in found.records:
         if is_part(record.path):
             continue
+        # The name of a file is that of its station
         station = record.path.stem
         codes = record.record.split(".")[2:]
         problem = other_than_asked(wanted, (codes[0], codes[1]), record.start, record.end)
@@ -244,13 +252,14 @@ def _others(found: SourceContents, wanted: Wanted) -> list[Rejection]:
     return list(rows.values())
 
 
-def _left_out(folder: Path, name: str) -> list[Rejection]:
-    """Return the rows of records that were left out of the answer of a service."""
-    try:
-        status = read_status(station_status(folder / f"{name}.mseed"))
-        return list(map(Rejection.stored, status.get("left_out", [])))
-    except (StatusError, TypeError, ValueError):
-        return []
+def _left_out(folder: Path, names: Iterable[str]) -> list[Rejection]:
+    """Return the rows of records that were left out of the answers of services."""
+    rows = list[Rejection]()
+    for name in names:
+        with suppress(StatusError, TypeError, ValueError):
+            status = read_status(station_status(folder / f"{name}.mseed"))
+            rows += map(Rejection.stored, status.get("left_out", []))
+    return rows
 
 
 def _stems(folder: Path, pattern: str) -> set[str]:
@@ -287,6 +296,7 @@ def _offers(
         except ServiceError as fault:
             rejected.append(Rejection("service", host(url), public_url(url), None, (str(fault),)))
             continue
+        # Several lines of a station are one offer
         unusable += faults
         channels: dict[str, set[tuple[str, str]]] = defaultdict(set)
         for line in lines:
@@ -302,6 +312,7 @@ def _listed(pool: WebPool, url: str, wanted: Wanted) -> tuple[list[StationLine],
 
     Raises ``ServiceError`` if its answer is no list, or one of nothing that was asked for.
     """
+    # Text is smaller than StationXML by far
     shown = public_url(url)
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
@@ -309,33 +320,40 @@ def _listed(pool: WebPool, url: str, wanted: Wanted) -> tuple[list[StationLine],
     try:
         lines, faults = station_lines(content)
     except ValueError as error:
-        raise ServiceError(
-            f"{shown}: answers with data other than a station list: {error}"
-        ) from error
-    rejected = [
-        Rejection("station", fault.name, shown, fault.number, (fault.reason,)) for fault in faults
-    ]
-    asked, others, unnamed = list[StationLine](), dict[str, None](), dict[str, Rejection]()
+        reason = f"answers with data other than a station list: {error}"
+        raise ServiceError(f"{shown}: {reason}") from error
+    asked = [line for line in lines if not _other_line(wanted, line)]
+    # Nothing that was asked for is a fault of the service, not the absence of stations
+    if lines and not asked:
+        others = "; ".join(dict.fromkeys(_other_line(wanted, line) for line in lines))
+        reason = f"lists only stations that were not asked for: {shortened(others, 300)}"
+        raise ServiceError(f"{shown}: {reason}: asked for {asked_for(wanted)}")
+    named, unnamed = _named(asked, shown)
+    rows = [Rejection("station", name, shown, line, (reason,)) for line, name, reason in faults]
+    return named, [*rows, *unnamed]
+
+
+def _other_line(wanted: Wanted, line: StationLine) -> str:
+    """Return what distinguishes a line of a list from a request; empty if nothing does."""
+    # The place decides before the channel
+    place = (line.latitude, line.longitude)
+    problem = other_than_asked(wanted, (line.location, line.channel), line.start, line.end)
+    if not is_inside(wanted, line.network, line.station, place):
+        problem = f"at {line.latitude:g}, {line.longitude:g}, which the request does not cover"
+    return f"{shortened(f'{line.network}.{line.station}', SHOWN)} {problem}" if problem else ""
+
+
+def _named(lines: list[StationLine], url: str) -> tuple[list[StationLine], list[Rejection]]:
+    """Return the lines of stations whose codes can name a file, and a row per other station."""
+    rows = dict[str, Rejection]()
     for line in lines:
         name = f"{line.network}.{line.station}"
-        codes = (line.location, line.channel)
-        problem = other_than_asked(wanted, codes, line.start, line.end)
-        if not is_inside(wanted, line.network, line.station, (line.latitude, line.longitude)):
-            problem = f"at {line.latitude:g}, {line.longitude:g}, which the request does not cover"
-        if problem:
-            others[f"{shortened(name, SHOWN)} {problem}"] = None
-        elif reason := code_problem(line.network, line.station, *codes):
-            row = Rejection("station", shortened(name, SHOWN), shown, None, (reason,))
-            unnamed.setdefault(name, row)
-        else:
-            asked.append(line)
-    # Nothing that was asked for is a fault of the service, not the absence of stations
-    if others and not asked and not unnamed:
-        reason = f"{shortened('; '.join(others), 300)}: asked for {asked_for(wanted)}"
-        raise ServiceError(f"{shown}: lists only stations that were not asked for: {reason}")
-    names = unnamed.keys()
-    asked = [line for line in asked if f"{line.network}.{line.station}" not in names]
-    return asked, [*rejected, *unnamed.values()]
+        # The first wrong code of a station is its reason
+        if problem := code_problem(line.network, line.station, line.location, line.channel):
+            row = Rejection("station", shortened(name, SHOWN), url, None, (problem,))
+            rows.setdefault(name, row)
+    named = [line for line in lines if f"{line.network}.{line.station}" not in rows]
+    return named, list(rows.values())
 
 
 def _stations(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import obspy
-from obspy import Inventory
+from obspy import Inventory, Stream
 from obspy.io.mseed.util import get_record_information
 
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
@@ -212,6 +212,7 @@ def _fetch_live(
     content = seedlink_window(pool, server, path.stem, offer.channels, window)
     if not content:
         raise _NoData(f"{server} has no data of the window")
+    # Real-time servers confuse channels and times as archives do
     url = f"seedlink://{server}"
     records = asked_records(content, url, wanted, path.stem)
     if not records.content:
@@ -249,16 +250,21 @@ def asked_records(content: bytes, url: str, wanted: Wanted, station: str) -> Rec
         problem = f"the answer is cut: its last MiniSEED record has {surplus} bytes"
         raise RecordRejected(shown, problem)
     _check(shown, station, {station_name(trace) for trace in traces})
-    # One row per channel that has records of another time, or is another one
+    return _divided(content, traces, shown, wanted)
+
+
+def _divided(content: bytes, traces: Stream, url: str, wanted: Wanted) -> Records:
+    """Return the records that were asked for, and one row per channel with others."""
     others, channels = dict[str, Rejection](), set[tuple[str, str]]()
     for trace in traces:
         stats = trace.stats
         codes = (stats.location, stats.channel)
         if problem := other_than_asked(wanted, codes, stats.starttime, stats.endtime):
             reason = f"records {problem}, are left out of the answer: asked for {asked_for(wanted)}"
-            others.setdefault(trace.id, Rejection("record", trace.id, shown, None, (reason,)))
+            others.setdefault(trace.id, Rejection("record", trace.id, url, None, (reason,)))
         else:
             channels.add(codes)
+    # Samples are not coded again
     if others:
         content = _without_others(content, wanted)
     return Records(content, frozenset(channels), tuple(others.values()))
@@ -266,6 +272,7 @@ def asked_records(content: bytes, url: str, wanted: Wanted, station: str) -> Rec
 
 def _without_others(content: bytes, wanted: Wanted) -> bytes:
     """Return the MiniSEED records that are of the channels and window of a request."""
+    # Records of several lengths may follow each other
     asked, place, file = bytearray(), 0, BytesIO(content)
     while place < len(content):
         record = get_record_information(file, place)
@@ -345,6 +352,7 @@ def _check_metadata(url: str, inventory: Inventory, wanted: Wanted) -> None:
         place = f"{station.latitude:g}, {station.longitude:g}"
         problem = f"answers with a station at {place}, outside the circle of the request"
         raise RecordRejected(url, problem)
+    # Channels that were not asked for may be there as well
     channels = [channel for network in inventory for station in network for channel in station]
     problems = [
         other_than_asked(

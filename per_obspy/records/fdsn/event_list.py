@@ -76,14 +76,21 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         raise CatalogError(source, "no such file")
     else:
         # Everything else is the base URL or the name of an event service, which selects itself
-        start, end = (_time(public_url(source), name, query) for name in ("starttime", "endtime"))
-        url = f"{base_url(source)}/fdsnws/event/1/query"
-        listed = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
-        rows = [row for row in listed if _is_between(row, start, end)]
-        if len(rows) < len(listed):
-            count = len(listed) - len(rows)
-            log.warning("%s: %d earthquakes of another time left out", public_url(url), count)
+        rows = _rows_of_service(source, query)
     return sorted(rows, key=lambda row: row.time, reverse=True)
+
+
+def _rows_of_service(source: str, query: Mapping[str, str]) -> list[EventRow]:
+    """Return the earthquakes that an event service lists of a query."""
+    start, end = (_time(public_url(source), name, query) for name in ("starttime", "endtime"))
+    url = f"{base_url(source)}/fdsnws/event/1/query"
+    listed = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
+    rows = [row for row in listed if _is_between(row, start, end)]
+    # A service may pass over a parameter that it does not know
+    if len(rows) < len(listed):
+        count = len(listed) - len(rows)
+        log.warning("%s: %d earthquakes of another time left out", public_url(url), count)
+    return rows
 
 
 def listed_events(
@@ -115,6 +122,7 @@ def listed_events(
     ServiceError
         If the service does not answer, or its answer is no list.
     """
+    # "Not found" is the answer of some services to an empty list
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
         rows, problems = _text_rows(answer(pool, url, {**query, "format": "text"}))
@@ -320,6 +328,7 @@ def _each(
         ) as error:
             problems.append(f"{shortened(name(entry), 80)}: {_reason(error)}")
             continue
+        # A number that can be read may still be no place
         if problem := row_problem(row):
             problems.append(f"{shortened(name(entry), 80)}: {problem}")
         else:

@@ -176,6 +176,7 @@ def other_than_asked(
     'of another channel, 00.BHZ'
     """
     location, channel = codes
+    # An empty location is asked for by dashes
     is_channel = _matches(channel, wanted.channels)
     if not is_channel or not _matches(location or "--", wanted.locations):
         return f"of another channel, {location}.{channel}"

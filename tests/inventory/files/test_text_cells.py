@@ -9,8 +9,8 @@ from per_obspy.inventory.files.text_cells import arrow_cells, cell, cells, given
 from per_obspy.inventory.files.writing import write_pairs
 
 TEXTS = [
-    "=1", "+a", "-", "@x", "|cmd", "\uff5cx", "'=1", "''=1", " =1", "\t=1", "\r+x", "\x00=", "\uff1d1", "-\u0661",
-    "-1", "+1e5", "-inf", "'s", "", "a\nb", "a\u202eb", "plain", "'", "'-1",
+    "=1", "+a", "-", "@x", "'=1", "''=1", " =1", "\t=1", "\r+x", "\x00=", "\uff1d1", "-\u0661",
+    "|cmd", "\uff5cx", "-1", "+1e5", "-inf", "'s", "", "a\nb", "a\u202eb", "plain", "'", "'-1",
 ]  # fmt: skip
 
 
