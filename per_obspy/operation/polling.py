@@ -77,6 +77,7 @@ def _state_of(watcher: Watcher) -> WatchState:
     settings = watch.model_dump_json(include=deciding)
     judged = content_hash({"settings": settings, "places": places, "radius": watcher.places.radius})
     if state.judged != judged:
+        update: dict[str, object]
         update = {"judged": judged, "seen": {}, "since": None, "ignored": {}}
         state = state.model_copy(update=update)
     return state
