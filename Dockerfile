@@ -14,11 +14,11 @@ COPY per_obspy /src/per_obspy
 COPY workflows/container /src/workflows/container
 RUN /src/workflows/container/install.sh install /src /opt/per-obspy
 
-# Kernels are compiled as the user that runs them, who keeps those of another processor too. Any user may write there
-# (docker run --user): where Numba cannot write, it compiles everything at each start.
+# Kernels are compiled as the user that runs them, who keeps those of another processor too. Others may read them only,
+# for whoever writes a kernel runs code as whoever loads it: another user (docker run --user) starts with a copy.
 USER per-obspy
 RUN /src/workflows/container/install.sh compile /opt/per-obspy \
- && chmod -R a+rwX "$NUMBA_CACHE_DIR" "$MPLCONFIGDIR"
+ && chmod -R u+rwX,go+rX,go-w "$NUMBA_CACHE_DIR" "$MPLCONFIGDIR"
 RUN /src/workflows/container/install.sh check /opt/per-obspy
 
 WORKDIR /data
@@ -26,5 +26,5 @@ VOLUME /data
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=1m --timeout=30s --start-period=5m --retries=3 \
   CMD per-obspy status /data || exit 1
-ENTRYPOINT ["per-obspy"]
+ENTRYPOINT ["/src/workflows/container/install.sh", "start", "/opt/per-obspy"]
 CMD ["watch", "/config/watch.toml"]

@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test workflows rehearsal check docs wheel benchmark extras clean
+.PHONY: demo figures test workflows rehearsal check docs wheel benchmark extras constraints clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -77,6 +77,11 @@ extras: .venv/run
 	@echo "== install what $(EXTRAS) need"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[check,docs,test,workflows]'
 	@touch $(EXTRAS:%=.venv/%)
+
+constraints: extras
+	@echo "== write the versions of this environment for container and CI, after a whole test"
+	$(BIN)/python workflows/container/constraints.py > workflows/container/constraints.part
+	mv workflows/container/constraints.part workflows/container/constraints.txt
 
 .venv/%: .venv/run
 	@echo "== install what '$*' needs"

@@ -6,7 +6,8 @@ The errors that a user can meet.
     PerError
     ├── RecordRejected   a record cannot be used; the run goes on without it
     ├── CatalogError     a file that the run needs (configuration, table, folder) is wrong
-    │   └── NothingUsable    a folder holds no record
+    │   ├── NothingUsable    a folder holds no record
+    │   └── WrongOutput      a folder stands where a file is to be written, or the other way round
     ├── MissingExtra     an optional library is not installed
     └── TryLater         no input is wrong: the same command succeeds later
         ├── ServiceError     a service does not answer
@@ -107,6 +108,10 @@ class CatalogError(PerError, ValueError):
 
 class NothingUsable(CatalogError):
     """A folder is as it should be, but holds no record."""
+
+
+class WrongOutput(CatalogError):
+    """The name of a result, or of its folder, is that of another kind of file."""
 
 
 class MissingExtra(PerError, ImportError):

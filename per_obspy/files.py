@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
-from per_obspy.errors import CatalogError, PerError, WriteError
+from per_obspy.errors import PerError, WriteError, WrongOutput
 
 #: How files of other kinds begin.
 SIGNATURES = {
@@ -29,7 +29,10 @@ SIGNATURES = {
 }
 
 #: Errors of a name that another kind of file has: another name mends them.
-_WRONG_NAMES = {errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ENOTEMPTY}
+_WRONG_NAMES = {
+    *(errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENOTEMPTY),
+    *(errno.ENAMETOOLONG, errno.ELOOP, errno.EILSEQ),
+}
 
 #: Errors of the machine when writing, and the mend; none is a mistake of program or input.
 _ROOM = "try again when there is room"
@@ -103,7 +106,7 @@ def written_whole(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    CatalogError
+    WrongOutput
         If the name or its folder is that of another kind of file.
     WriteError
         If the folder cannot be made or written to, or the disk is full.
@@ -169,7 +172,7 @@ def writing(path: Path) -> Iterator[None]:
 
     Raises
     ------
-    CatalogError
+    WrongOutput
         If the name or its folder is that of another kind of file.
     WriteError
         If the machine cannot write.
@@ -201,7 +204,7 @@ def _failed_write(path: Path, error: OSError) -> PerError | None:
     # The folder is named where its name is the wrong one
     if error.errno in _WRONG_NAMES:
         place = f"{path.parent}: " if not path.parent.is_dir() else ""
-        return CatalogError(str(path), f"cannot be written: {place}{reason}")
+        return WrongOutput(str(path), f"cannot be written: {place}{reason}")
     # Some libraries keep the number in the message only
     named = _named_failure(error) if error.errno is None else None
     return _failed_write(path, named) if named else None

@@ -8,10 +8,12 @@ read, has the same key, and every output still has its hash; anything else (no s
 one, one of another program, an output that is missing, cut or changed) means that it is done again.
 """
 
+import hashlib
 import json
+import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from per_obspy.files import file_hash, written_whole
 
@@ -79,6 +81,79 @@ def changed_outputs(path: Path, status: Status) -> list[Path]:
         if not _is_near(path, file) or hash_if_readable(file) != known:
             changed.append(file)
     return changed
+
+
+class Comparison(NamedTuple):
+    """
+    Outcome of a comparison of files with their hashes.
+
+    Attributes
+    ----------
+    changed : tuple of Path
+        Files that are missing or have another content.
+    compared : int
+        Number of files that were compared, or are missing.
+    files : int
+        Number of all files.
+    """
+
+    changed: tuple[Path, ...]
+    compared: int
+    files: int
+
+
+def compare_outputs(statuses: Mapping[Path, Status], seconds: float) -> Comparison:
+    """
+    Compare the outputs of some status files with their hashes, the smallest first.
+
+    Parameters
+    ----------
+    statuses : mapping of Path to dict
+        Status file -> its content.
+    seconds : float
+        Longest time, s: what is left then, of outputs of any size, is not compared.
+    """
+    until, changed, compared = time.monotonic() + seconds, list[Path](), 0
+    sizes = _sizes(statuses)
+    for file, (size, digest) in sorted(sizes.items(), key=lambda item: item[1][0]):
+        found = _hash_until(file, until) if size >= 0 else ""
+        # The time is over
+        if found is None:
+            break
+        compared += 1
+        if found != digest or size < 0:
+            changed.append(file)
+    return Comparison(tuple(changed), compared, len(sizes))
+
+
+def _sizes(statuses: Mapping[Path, Status]) -> dict[Path, tuple[int, str]]:
+    """Return size, bytes, and hash of every output; -1 for one that is missing or no file."""
+    sizes = dict[Path, tuple[int, str]]()
+    for path, status in statuses.items():
+        for name, digest in status["outputs"].items():
+            file = path.parent / str(name)
+            # A folder or pipe in the place of a file is none, and never read
+            try:
+                is_whole = _is_near(path, file) and file.is_file()
+                sizes[file] = (file.stat().st_size if is_whole else -1, str(digest))
+            except OSError:
+                sizes[file] = (-1, "")
+    return sizes
+
+
+def _hash_until(path: Path, until: float) -> str | None:
+    """Return the hash of a file, empty if it cannot be read, None if the time is over before."""
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as file:
+            while time.monotonic() < until:
+                piece = file.read(1 << 20)
+                digest.update(piece)
+                if not piece:
+                    return digest.hexdigest()
+    except OSError:
+        return ""
+    return None
 
 
 def _is_near(path: Path, file: Path) -> bool:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from per_obspy.errors import Rejection
-    from per_obspy.records.fdsn.event_list import EventRow
+    from per_obspy.records.event_file import EventRow
 
 #: What the table of earthquakes shows of each.
 EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")

@@ -348,12 +348,31 @@ def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
     for group in earthquakes:
         if len(earthquakes) > 1 and group["screened"]:
             # The others are left out, each by its start
-            others = ", ".join(other["start"] for other in earthquakes if not other["screened"])
-            facts = f"{group['stations']} stations; others, left out: {others}"
-            lines.append(f"Records of {len(earthquakes)} earthquakes: {group['start']}, {facts}")
+            lines += _left_out_lines(group, [one for one in earthquakes if not one["screened"]])
         undated = group.get("undated", 0)
         if group["screened"] and undated and undated < group["records"]:
             lines.append(f"{undated} records have no date and are taken for this one.")
+    return lines
+
+
+def _left_out_lines(screened: dict[str, Any], groups: "Sequence[dict[str, Any]]") -> list[str]:
+    """Return lines on the records of a folder that are not of the screened earthquake."""
+    lines = []
+    # Groups that may differ by their clocks only are no other earthquakes for sure
+    apart = [group for group in groups if not group.get("joined_by")]
+    clocks = [group for group in groups if group.get("joined_by")]
+    if apart:
+        others = ", ".join(group["start"] for group in apart)
+        facts = f"{screened['stations']} stations; others, left out: {others}"
+        lines.append(f"Records of {len(apart) + 1} earthquakes: {screened['start']}, {facts}")
+    # Both may be true of one folder
+    if clocks:
+        starts = ", ".join(f"{group['start']} ({group['stations']} stations)" for group in clocks)
+        lines.append(
+            f"Screened: records from {screened['start']}, {screened['stations']} stations. Not "
+            f"used: {starts}: another earthquake, or the same by clocks that differ, as no station "
+            f"has both; records.event_gap = {clocks[0]['joined_by']:g} takes them as one."
+        )
     return lines
 
 

@@ -1,7 +1,8 @@
 """
 Independent tasks on several processes or any executor; a failure does not stop other tasks.
 
-The exception is a machine that cannot write: the first ``WriteError`` ends the work.
+The exception is a folder of results that cannot be written: the first ``WriteError`` or
+``WrongOutput`` ends the work.
 
 A fault of the data is the result of its task. A fault of the machine (:mod:`per_obspy.machine`, or
 a worker that dies) is none: the task stays undone, and ``Unfinished`` is raised after all others.
@@ -29,7 +30,7 @@ from multiprocessing import active_children, parent_process
 from threading import Lock, Thread
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
+from per_obspy.errors import PerError, TryLater, Unfinished, WriteError, WrongOutput
 from per_obspy.jobs.worker_start import start_server, worker_context
 from per_obspy.machine import machine_fault, raise_machine_fault
 from per_obspy.termination import held
@@ -115,7 +116,7 @@ def results(
 
     Raises
     ------
-    WriteError
+    WriteError, WrongOutput
         If a task cannot write its result; tasks that have not begun are cancelled.
     Unfinished
         After all other tasks, if the machine failed in some.
@@ -222,7 +223,7 @@ class _Watched(Generic[Task, Result]):
         except BrokenExecutor as error:
             self.broken = str(error)
             raise
-        except WriteError:
+        except (WriteError, WrongOutput):
             raise
         except TryLater as error:
             self.note(task, str(error))
@@ -252,7 +253,7 @@ def _on(
     """Yield results until all tasks are done or the executor is broken; return its tasks then."""
     remaining, unfinished = iter(tasks), list[Task]()
     pending: dict[Future[Result], Task] = {}
-    unwritten: WriteError | None = None
+    unwritten: WriteError | WrongOutput | None = None
     while True:
         # Keep the executor busy, but only a few tasks ahead of the results
         room = 0 if unfinished else ahead() - len(pending)
@@ -272,7 +273,7 @@ def _on(
                 yield from watched.result(task, future.result)
             except BrokenExecutor:
                 unfinished.append(task)
-            except WriteError as error:
+            except (WriteError, WrongOutput) as error:
                 unwritten = error
         # Other tasks cannot write either; finished results have been passed on
         if unwritten:

@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.config import Processing, Spectra
-from per_obspy.errors import CatalogError, PerError, Rejection, TryLater
+from per_obspy.errors import CatalogError, PerError, Rejection, TryLater, WrongOutput
 from per_obspy.files import bytes_hash, file_hash, remove_file
 from per_obspy.jobs.event_facts import (
     hypocentre_attributes,
@@ -170,7 +170,7 @@ def do_stations(
 
     Raises
     ------
-    WriteError
+    WriteError, WrongOutput
         If a station file cannot be written.
     Unfinished
         After all other stations, if the machine failed at some.
@@ -249,7 +249,7 @@ def _products(job: StationJob, decisions: list[dict[str, Any]]) -> Products:
     try:
         stream, unread = job.reader(job.source, job.inventory, job.station)
         products = job.product(job, stream, source_of_job(job.event, decisions))
-    except TryLater:
+    except (TryLater, WrongOutput):
         raise  # no property of the station
     except PerError as error:
         raise_machine_fault(error)

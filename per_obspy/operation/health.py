@@ -2,17 +2,24 @@
 
 import os
 import platform
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.errors import CatalogError
 from per_obspy.operation.status import STATUS, WatchStatus, read_status
-from per_obspy.resume import StatusError
+from per_obspy.resume import Comparison, Status, StatusError, compare_outputs
 from per_obspy.resume import read_status as read_record
 
 #: Record of a run in its folder.
 RECORD = "run.json"
+
+#: Ignored earthquakes that are printed; ``status --json`` has up to 1000.
+SHOWN = 50
+
+#: Longest time of a comparison of results with their hashes, s: a check of health has 30 s.
+COMPARED_WITHIN = 10.0
 
 #: s that work may last beyond the time at which a watcher is due.
 LATE = 900.0
@@ -25,7 +32,7 @@ class Health(NamedTuple):
     Attributes
     ----------
     state : str
-        ``"fine"``, ``"late"``, ``"failing"``, ``"stopped"``, ``"unfinished"`` or
+        ``"fine"``, ``"late"``, ``"failing"``, ``"damaged"``, ``"stopped"``, ``"unfinished"`` or
         ``"nothing_usable"``.
     lines : tuple of str
         Facts in words.
@@ -57,12 +64,57 @@ def folder_health(folder: Path, late: float = LATE, now: datetime | None = None)
         If the folder has neither, or a damaged one.
     """
     if (folder / STATUS).exists():
-        return _watcher(read_status(folder), late, now or datetime.now(UTC))
+        health = _watcher(read_status(folder), late, now or datetime.now(UTC))
+        return _with_comparison(health, _newest_revisions(folder))
     if (folder / RECORD).exists():
         return _run(folder / RECORD)
     raise CatalogError(
         str(folder), f"holds neither {STATUS} of a watcher nor {RECORD} of a run: name its folder"
     )
+
+
+def _newest_revisions(folder: Path) -> list[Path]:
+    """Return the description of the newest results of every earthquake, the latest first."""
+    files = [(file.stat().st_mtime, file) for file in folder.glob("events/*/latest/revision.json")]
+    return [file for _, file in sorted(files, reverse=True)]
+
+
+def _with_comparison(health: Health, files: Sequence[Path]) -> Health:
+    """Return the health of a folder after a comparison of its results with their hashes."""
+    statuses, unreadable = dict[Path, Status](), list[str]()
+    for file in files:
+        try:
+            statuses[file] = read_record(file)
+        except StatusError as error:
+            unreadable.append(f"damaged: {file}: {error}")
+    if not statuses and not unreadable:
+        return health
+    comparison = compare_outputs(statuses, COMPARED_WITHIN)
+    # Whatever else is wrong needs a person first
+    is_damaged = bool(unreadable or comparison.changed)
+    state = "damaged" if is_damaged and health.state in ("fine", "late") else health.state
+    facts = {
+        **health.facts,
+        "state": state,
+        "damaged": [str(file) for file in comparison.changed],
+        "compared": [comparison.compared, comparison.files],
+    }
+    # The first line names the state
+    first = health.lines[0].replace(health.state, state)
+    lines = (first, *health.lines[1:], *_comparison_lines(comparison), *unreadable)
+    return Health(state, lines, facts)
+
+
+def _comparison_lines(comparison: Comparison) -> list[str]:
+    """Return the outcome of a comparison in words."""
+    # Huge results take longer than a check of health may
+    lines = [f"results: {comparison.compared} of {comparison.files} files compared"]
+    if comparison.compared < comparison.files:
+        lines[0] += f" within {COMPARED_WITHIN:g} s, the largest are not"
+    lines += [f"damaged: {file}: is not as it was written" for file in comparison.changed[:SHOWN]]
+    if len(comparison.changed) > SHOWN:
+        lines.append(f"damaged: {len(comparison.changed) - SHOWN} further files")
+    return lines
 
 
 def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
@@ -82,12 +134,21 @@ def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
         f"events open: {status.events_open}",
         f"next due: {status.next_due or 'never'}" + (f", {behind:.0f} s ago" if behind > 0 else ""),
     ]
+    lines += _ignored_lines(status)
     if status.last_error:
         lines.append(f"last error: {status.last_error} ({status.failures} in succession)")
     if status.last_notification_error:
         lines.append(f"notification: {status.last_notification_error}")
     lines.append(f"process: {status.pid} on {status.host}, per_obspy {status.version}")
     return Health(state, tuple(lines), {"state": state, **status.model_dump(mode="json")})
+
+
+def _ignored_lines(status: WatchStatus) -> list[str]:
+    """Return the earthquakes without runs, the latest first; none if there are none."""
+    if not status.ignored:
+        return []
+    latest = status.ignored[: -SHOWN - 1 : -1]
+    return [f"events ignored: {len(status.ignored)}", *(f"  {line}" for line in latest)]
 
 
 def _seconds_behind(due: str | None, now: datetime) -> float:
@@ -130,7 +191,12 @@ def _run(file: Path) -> Health:
     facts = stations if isinstance(stations, dict) else {}
     lines = [f"run {record.get('name', '')}: {health}", *_station_lines(facts)]
     lines += [str(fault) for fault in _list(record.get("faults"))]
-    return Health(health, tuple(lines), {"state": health, "stations": facts})
+    plain = Health(health, tuple(lines), {"state": health, "stations": facts})
+    # A run at work replaces its results one by one
+    if health == "unfinished":
+        return plain
+    # Stations are results too, which a later screening reads
+    return _with_comparison(plain, [file, *sorted(file.parent.glob("stations/*.json"))])
 
 
 def _station_lines(stations: dict[str, Any]) -> list[str]:

@@ -5,11 +5,17 @@ from datetime import datetime
 
 from per_obspy.config import Watch
 from per_obspy.errors import CatalogError, PerError, ServiceError, TryLater, shortened
+from per_obspy.files import content_hash
 from per_obspy.operation.events.due import is_paused
 from per_obspy.operation.events.event_feed import Feed, noted_poll, read_feed
 from per_obspy.operation.events.event_settings import Watcher, watch_of
 from per_obspy.operation.events.failures import after_pause, known_fault
-from per_obspy.operation.events.open_events import listed_states, present_state
+from per_obspy.operation.events.open_events import (
+    ignored_events,
+    judged_feed,
+    listed_states,
+    present_state,
+)
 from per_obspy.operation.events.relevance import Circle, circle_around
 from per_obspy.operation.events.state import (
     EventState,
@@ -48,20 +54,33 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
         state = _failed_poll(state, fault, now)
     else:
         errors += _problems(watch, feed)
-        for known in listed_states(watch, watcher.places, states, feed, now):
+        judgement = judged_feed(watch, watcher.places, states, feed, now)
+        for known in list(listed_states(watch, states, judgement, now)):
             keep(watcher, states, known)
         # The list comes last: states that it opened are written
-        state = noted_poll(state, feed, now)
+        ignored = ignored_events(state.ignored, states, judgement, feed.seen)
+        state = noted_poll(state, feed, now).model_copy(update={"ignored": ignored})
     write_watch_state(watcher.folder, state)
     return state
 
 
 def _state_of(watcher: Watcher) -> WatchState:
-    """Return the state of the watched folder; pauses of another list count no longer."""
+    """Return the state of the watched folder; pauses and marks of another list count no longer."""
     watch = watch_of(watcher.settings)
     source = str(watch.service or watch.folder)
     state = read_watch_state(watcher.folder)
-    return state if state.source == source else WatchState(source=source, resting=state.resting)
+    if state.source != source:
+        state = WatchState(source=source, resting=state.resting)
+    # With other settings or buildings, what was ignored may matter now: all is looked at again
+    places = [watcher.places.longitude.tolist(), watcher.places.latitude.tolist()]
+    deciding = {"region", "magnitudes", "assumed_magnitude", "oldest"}
+    settings = watch.model_dump_json(include=deciding)
+    judged = content_hash({"settings": settings, "places": places, "radius": watcher.places.radius})
+    if state.judged != judged:
+        update: dict[str, object]
+        update = {"judged": judged, "seen": {}, "since": None, "ignored": {}}
+        state = state.model_copy(update=update)
+    return state
 
 
 def _circle(watcher: Watcher) -> Circle:

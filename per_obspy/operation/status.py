@@ -41,6 +41,8 @@ class WatchStatus(Section):
         Number of polls and updates in succession that failed.
     last_notification_error : str or None
         Reason why the latest message was not delivered; None: it was, or there was none.
+    ignored : tuple of str
+        Listed earthquakes without runs, each with the reason, the latest last.
     running : bool
         Whether the process stays between polls, rather than being started by a timer.
     pid : int
@@ -60,6 +62,7 @@ class WatchStatus(Section):
     next_due: Moment | None = None
     failures: int = Field(0, ge=0)
     last_notification_error: str | None = None
+    ignored: tuple[str, ...] = ()
     running: bool = False
     pid: int = Field(default_factory=os.getpid, ge=0)
     host: str = Field(default_factory=platform.node)

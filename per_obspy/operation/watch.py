@@ -29,6 +29,7 @@ from per_obspy.operation.events.state import (
     WatchState,
     changed,
     event_folder,
+    ignored_lines,
     iso,
     moment,
     read_event_states,
@@ -279,9 +280,8 @@ def _ended(
     # The next look at the list, or a run before it
     following = now + timedelta(seconds=watch.poll)
     for known in states.values():
-        due = next_due(now, known, watch.delays)
-        following = min(following, due or following)
-    count = sum(known.state == "open" for known in states.values())
+        following = min(following, next_due(now, known, watch.delays) or following)
+    count = [known.state for known in states.values()].count("open")
     # For `per-obspy status` and monitoring
     status = WatchStatus(
         last_poll=state.last_poll,
@@ -292,6 +292,7 @@ def _ended(
         last_notification_error=undelivered(
             event_folder(watcher.folder, event_id) / WORK for event_id in states
         ),
+        ignored=ignored_lines(state),
         running=running,
     )
     write_status(watcher.folder, status)

@@ -109,27 +109,23 @@ def read_asdf_station(
     return stream, tuple(rejected)
 
 
-def read_asdf_event(path: Path) -> Event:
+def read_asdf_events(path: Path) -> list[Event]:
     """
-    Read the one event of an ASDF file.
+    Read the events of an ASDF file.
 
     Raises
     ------
     CatalogError
-        If it does not hold exactly one event with an origin.
+        If its QuakeML cannot be read.
     """
     with _opened(path) as file:
         content = _bytes(file["QuakeML"]) if "QuakeML" in file.variables else b""
     # A file without QuakeML holds no event
     try:
-        events = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
+        found = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
-    if len(events) != 1 or not events[0].origins:
-        raise CatalogError(
-            str(path), f"must hold one event with an origin, holds {len(events)} events"
-        )
-    return events[0]
+    return list(found)
 
 
 def has_event(path: Path) -> bool:

@@ -196,7 +196,7 @@ def _read_file(path: Path, limits: Archives) -> _File:
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
         if file.kind == "station text":
-            return file._replace(inventory=read_station_text(path, content))
+            return _with_station_text(file, content)
         if file.kind == "station table":
             return file._replace(rows=read_station_table(str(path), content))
         if file.kind == "ITACA metadata":
@@ -207,6 +207,14 @@ def _read_file(path: Path, limits: Archives) -> _File:
             return file._replace(kind="document")
         return file._replace(rejection=_rejected_file(path, rejection))
     return file
+
+
+def _with_station_text(file: _File, content: bytes) -> _File:
+    """Return a file with the stations of its lines, and the lines that cannot be read."""
+    inventory, faults = read_station_text(file.path, content)
+    rejection = RecordRejected(str(file.path), *faults) if faults else None
+    row = _rejected_file(file.path, rejection) if rejection else None
+    return file._replace(inventory=inventory, rejection=row)
 
 
 def _with_itaca_metadata(file: _File, content: bytes) -> _File:

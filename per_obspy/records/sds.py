@@ -5,11 +5,14 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+import obspy
 from obspy import Inventory, Stream, UTCDateTime
 
-from per_obspy.errors import CatalogError, Rejection, reason_of
+from per_obspy.errors import CatalogError, RecordRejected, Rejection, reason_of
+from per_obspy.records.archives.archive_files import read_file
 from per_obspy.records.contents.metadata_files import merged_inventory, read_inventories
 from per_obspy.records.folder import SourceContents, read_station
+from per_obspy.records.obspy_readers import read_content
 
 _DAY = 86400.0  # s
 
@@ -100,10 +103,40 @@ def read_sds_station(
     """
     Read one station's part of the window, as ``records.folder.read_station`` does.
 
-    A station without samples in the window is a rejection.
+    A day file that holds another channel or day than its name says is a rejection, and so is a
+    station without samples in the window.
     """
-    stream, rejected = read_station(paths, inventory, station, start, end)
-    if not stream and not rejected:
+    usable, others = list[Path](), list[Rejection]()
+    # Names of files are the index of an archive
+    for path in paths:
+        reason = _other_than_named(path)
+        if reason:
+            others.append(Rejection("file", path.name, str(path), None, (reason,)))
+        else:
+            usable.append(path)
+    stream, rejected = read_station(usable, inventory, station, start, end)
+    if not stream and not rejected and not others:
         reason = f"no samples from {start} to {end}"
         rejected = (Rejection("station", station, "", None, (reason,)),)
-    return stream, rejected
+    return stream, (*others, *rejected)
+
+
+def _other_than_named(path: Path) -> str:
+    """Return what a day file holds instead of the channel and day of its name; else empty."""
+    *codes, _, year, day = path.name.split(".")
+    # Whatever cannot be read is refused when it is read
+    try:
+        traces = read_content(obspy.read, read_file(path), path, headonly=True)
+        midnight = UTCDateTime(year=int(year), julday=int(day))
+    except (RecordRejected, ValueError, TypeError):
+        return ""
+    names = sorted({trace.id for trace in traces} - {".".join(codes)})
+    if names:
+        return f"holds records of {', '.join(names)} under the name of another channel"
+    # A first and last block may reach over midnight
+    spans = [(trace.stats.starttime, trace.stats.endtime) for trace in traces]
+    if any(start < midnight + 2 * _DAY and end > midnight - _DAY for start, end in spans):
+        return ""
+    first = min(start for start, _ in spans)
+    last = max(end for _, end in spans)
+    return f"holds records of {first} to {last} under the name of another day"

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from per_obspy.config import Processing, Scenario, Spectra
-from per_obspy.errors import CatalogError, Unfinished
+from per_obspy.errors import CatalogError, Unfinished, WrongOutput
 from per_obspy.jobs import station as jobs
 from per_obspy.jobs.parallel import DIED
 from per_obspy.jobs.station import StationJob, do_stations, earlier_station
@@ -181,3 +181,31 @@ def test_a_key_that_cannot_be_computed_costs_its_own_station(tmp_path):
     stations = done(batch)
     assert [station.station for station in stations] == ["XX.S1", "XX.S2"]
     assert stations[0].rejected[0].reasons[0].startswith("AttributeError")
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".json"])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_folder_in_the_place_of_a_station_file_is_no_property_of_the_station(
+    make_jobs, suffix, workers
+):
+    # would catch a station that is rejected, and a run that ends as if all were well
+    first, *others = make_jobs()
+    (first.shard.with_suffix(suffix) / "inside").mkdir(parents=True)
+    with pytest.raises(WrongOutput, match=rf"S001\{suffix}: cannot be written: Is a directory"):
+        done([first, *others], workers)
+
+
+@pytest.mark.parametrize(
+    ("folder", "reason"),
+    [("file", "(Not a directory|File exists)"), ("x" * 250, "File name too long"), ("loop", ".*")],
+)
+def test_a_folder_of_stations_that_cannot_be_is_no_property_of_them(
+    make_jobs, tmp_path, folder, reason
+):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "loop").symlink_to("loop")
+    name = "XX.S001.nc" if len(folder) < 10 else f"{folder}.nc"
+    place = tmp_path / folder / name if len(folder) < 10 else tmp_path / name
+    with pytest.raises(WrongOutput, match=f"cannot be written: .*{reason}") as error:
+        done([job._replace(shard=place) for job in make_jobs()])
+    assert "\n" not in str(error.value)

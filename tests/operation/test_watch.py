@@ -7,28 +7,31 @@ Tests ``per_obspy.operation.polling``, ``per_obspy.operation.events.event_feed``
 
 import errno
 import json
+import logging
 import os
 import shutil
 import sys
 import time
 import tracemalloc
+from io import BytesIO
 from pathlib import Path
 
 import obspy
 import pytest
-from fdsn_server import content, status
+from fdsn_server import content, empty, event_text, status, whole
 from watched_city import (
     magnified,
     other_event,
     quick_run,
 )
 
-from per_obspy.config import Notify
+from per_obspy.config import Notify, Reach
 from per_obspy.errors import CatalogError, FolderInUse, ServiceError, TryLater, WriteError
 from per_obspy.files import file_hash
 from per_obspy.operation import watch
 from per_obspy.operation.events import event_run
 from per_obspy.operation.events.state import read_event_states
+from per_obspy.operation.health import folder_health
 from per_obspy.operation.status import read_status
 from per_obspy.operation.watch import watch_forever
 from per_obspy.pipeline.inputs.described_runs import result_facts
@@ -457,6 +460,90 @@ def test_folder_of_quakeml(city, simulation, tmp_path):
     file.unlink()
     city.at(150, **feed)
     assert city.state("event").reason == "deleted at its source"
+
+
+@pytest.mark.parametrize("listed_by", ["service", "folder"])
+@pytest.mark.parametrize(
+    ("event", "reason", "wider"),
+    [
+        (
+            other_event(-20 * 86_400, 7.0),
+            "older than 604800 s (watch.oldest)",
+            {"oldest": 30 * 86_400.0},
+        ),
+        (
+            other_event(-60, 4.0),
+            "magnitude 4 at 33 km does not matter (watch.magnitudes)",
+            {"magnitudes": (Reach(distance=5e5, magnitude=3.0),)},
+        ),
+        (
+            other_event(-60, 7.0, longitude=9.0),
+            " km does not matter (watch.magnitudes)",
+            {"magnitudes": (Reach(distance=2e6, magnitude=6.0),)},
+        ),
+    ],
+)
+def test_an_ignored_earthquake_is_a_line_and_matters_after_a_change(
+    city, server, tmp_path, caplog, event, reason, wider, listed_by
+):
+    caplog.set_level(logging.INFO)
+    # A service leaves out by itself what is too old or too far
+    server.events = {"old1": event}
+    feed = {"updatedafter": True}
+    if listed_by == "folder":
+        feed = in_folder(tmp_path / "feed")
+        write_event(tmp_path / "feed", "old1.xml", event)
+    else:
+        server.fail("event", "*", content(event_text(server.events).encode()))
+    city.at(100, **feed)
+    assert read_event_states(city.folder)[0] == {}
+    (line,) = read_status(city.folder).ignored
+    assert reason in line
+    assert [
+        reason in record.message for record in caplog.records if "ignored" in record.message
+    ] == [True]
+    assert any(reason in shown for shown in folder_health(city.folder, 1e9).lines)
+    # It is one line however often the list is looked at
+    city.at(200, **feed)
+    assert len(read_status(city.folder).ignored) == 1
+    assert sum("ignored" in record.message for record in caplog.records) == 1
+    # With another configuration the same file, or an answer without changes, is looked at again
+    city.at(300, **feed, **wider)
+    (state,) = read_event_states(city.folder)[0].values()
+    assert state.state in ("open", "finished")
+    assert read_status(city.folder).ignored == ()
+
+
+def test_a_file_with_one_wrong_earthquake_costs_no_other(city, simulation, tmp_path):
+    feed = in_folder(tmp_path / "feed")
+    placeless = other_event(-60, 7.0)
+    placeless.origins[0].longitude = None
+    catalog = obspy.core.event.Catalog([placeless, simulation.event])
+    catalog.write(tmp_path / "feed" / "a.xml", format="QUAKEML")
+    (error,) = city.at(61, **feed).errors
+    assert "has an origin without longitude" in str(error)
+    assert len(read_event_states(city.folder)[0]) == 1
+
+
+def test_an_answer_of_another_earthquake_is_no_update(city, server):
+    city.at(61)
+    server.fail("event", "*", whole, content(quakeml(other_event(-86_400, 7.9))))
+    (error,) = city.at(8000, poll=1e9).errors
+    assert "with an earthquake of 1999-12-31T00:00:00, listed was 2000-01-01T00:00:00" in str(error)
+    assert city.state().magnitude == 6.5
+
+
+def test_an_empty_answer_deletes_nothing(city, server):
+    city.at(61)
+    server.fail("event", "*", empty, empty)
+    assert 'which is not "no data"' in str(city.at(8000).errors[0])
+    assert city.state().state == "open"
+
+
+def quakeml(event) -> bytes:
+    file = BytesIO()
+    obspy.core.event.Catalog([event]).write(file, format="QUAKEML")
+    return file.getvalue()
 
 
 def test_file_that_is_no_quakeml_waits_while_it_is_young(city, tmp_path, simulation):

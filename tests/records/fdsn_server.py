@@ -17,7 +17,7 @@ from typing import NamedTuple
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
-from obspy import Inventory, Stream, UTCDateTime
+from obspy import Inventory, Stream, UTCDateTime, read
 from obspy.core.event import Catalog, Event, Origin
 from obspy.geodetics import locations2degrees
 
@@ -169,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
                 if _is_listed(event, parameters, self.server.updated.get(name))
             }
             limit = int(parameters.get("limit", len(listed)))
-            return _event_text(dict(list(listed.items())[:limit])).encode()
+            return event_text(dict(list(listed.items())[:limit])).encode()
         if parameters["eventid"] not in events:
             return b""
         content = BytesIO()
@@ -214,7 +214,7 @@ def _degrees(origin: Origin, parameters: dict[str, str]) -> float:
     return float(locations2degrees(origin.latitude, origin.longitude, *centre))
 
 
-def _event_text(events: dict[str, Event]) -> str:
+def event_text(events: dict[str, Event]) -> str:
     """Return a list of events, as the text format has it."""
     head = "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID"
     rows = [f"{head}|MagType|Magnitude|MagAuthor|EventLocationName"]
@@ -316,6 +316,31 @@ def shortened(handler: _Handler, body: bytes) -> None:
 def content(wrong: bytes) -> Fault:
     """Answer 200 with a web page."""
     return lambda handler, _: handler.reply(200, wrong)
+
+
+def changed(change: Callable[[Stream], Stream]) -> Fault:
+    """Send records that a service has confused in some way."""
+
+    def answer(handler: _Handler, body: bytes) -> None:
+        whole(handler, mseed(change(read(BytesIO(body)))) if body else body)
+
+    return answer
+
+
+def moved(seconds: float, channels: str = "*") -> Callable[[Stream], Stream]:
+    """Return a change that moves the records of some channels in time, s."""
+
+    def move(stream: Stream) -> Stream:
+        for trace in stream.select(channel=channels):
+            trace.stats.starttime += seconds
+        return stream
+
+    return move
+
+
+def empty(handler: _Handler, _: bytes) -> None:
+    """Answer 200 without content, as a service whose archive is away does."""
+    handler.reply(200, b"")
 
 
 def unframed(part: float) -> Fault:

@@ -12,6 +12,7 @@ from obspy.core.event import Catalog, Event, Magnitude, Origin
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
+from per_obspy.processing.noise.windows import source_of
 from per_obspy.records.event_file import portable, read_event, read_event_file
 
 START = UTCDateTime(2019, 7, 6, 3, 19, 53)
@@ -71,7 +72,11 @@ def test_an_event_without_magnitude_stays_without(tmp_path: Path):
 
 
 WRONG = {
-    "two events": ([Origin(time=START)], 2, "must hold one event, holds 2"),
+    "two events": (
+        [Origin(time=START, latitude=1.0, longitude=2.0)],
+        2,
+        "must hold one event, holds 2",
+    ),
     "no origin": ([], 1, "has no origin"),
     "no time": ([Origin(latitude=1.0, longitude=2.0)], 1, "has an origin without time"),
 }
@@ -84,6 +89,59 @@ def test_a_file_needs_one_event_with_origin_and_time(tmp_path: Path, fault: str)
     Catalog(events).write(str(tmp_path / "event.xml"), format="QUAKEML")
     with pytest.raises(CatalogError, match=rf"event\.xml: .*{reason}"):
         read_event_file(tmp_path / "event.xml")
+
+
+QUAKEML = """<?xml version="1.0"?>
+<q:quakeml xmlns="http://quakeml.org/xmlns/bed/1.2" xmlns:q="http://quakeml.org/xmlns/quakeml/1.2">
+<eventParameters publicID="smi:a/b"><event publicID="smi:a/one"><origin publicID="smi:a/o">
+<time><value>2023-02-06T01:17:34</value></time><latitude><value>37.2</value></latitude>
+<longitude><value>37.0</value></longitude><depth><value>10000</value></depth></origin>
+<magnitude publicID="smi:a/m"><mag><value>7.8</value></mag></magnitude>
+</event></eventParameters></q:quakeml>"""
+
+VALUES = {"time": "2023-02-06T01:17:34", "latitude": "37.2", "longitude": "37.0"}
+
+
+@pytest.mark.filterwarnings("ignore:Could not convert")
+@pytest.mark.parametrize("field", VALUES)
+@pytest.mark.parametrize("value", [None, "", "x", "1e9", "nan"])
+def test_an_earthquake_without_time_or_place_is_one_line(tmp_path: Path, field: str, value):
+    tag = f"<{field}><value>{VALUES[field]}</value></{field}>"
+    new = "" if value is None else f"<{field}><value>{value}</value></{field}>"
+    (tmp_path / "event.xml").write_text(QUAKEML.replace(tag, new))
+    with pytest.raises(CatalogError, match=rf"event\.xml: .*{field}") as error:
+        read_event_file(tmp_path / "event.xml")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.filterwarnings("ignore:Could not convert")
+@pytest.mark.parametrize(
+    ("old", "new", "depth", "magnitude"),
+    [
+        ("<depth><value>10000</value></depth>", "", 10_000.0, 7.8),
+        ("<value>10000<", "<value><", 10_000.0, 7.8),
+        ("<mag><value>7.8</value></mag>", "", 10_000.0, None),
+        ("<value>7.8<", "<value>x<", 10_000.0, None),
+        ("<magnitude", '<magnitude publicID="smi:a/n"><mag/></magnitude><magnitude', 10_000.0, 7.8),
+    ],
+)
+def test_depth_and_magnitude_may_be_unknown(tmp_path: Path, old, new, depth, magnitude):
+    (tmp_path / "event.xml").write_text(QUAKEML.replace(old, new))
+    source = source_of(portable(read_event_file(tmp_path / "event.xml")).event)
+    # 10 km stand for an unknown depth
+    assert (source.depth, source.magnitude) == (depth, magnitude)
+
+
+@pytest.mark.parametrize(("old", "new"), [("10000", "1e9"), ("7.8<", "78<"), ("10000", "-1e6")])
+def test_a_depth_or_magnitude_that_cannot_be_true_is_one_line(tmp_path: Path, old, new):
+    (tmp_path / "event.xml").write_text(QUAKEML.replace(old, new))
+    with pytest.raises(CatalogError, match=r"the event smi:a/one: (depth|magnitude) .*: expected"):
+        read_event(tmp_path / "event.xml")
+
+
+def test_degrees_east_up_to_360_are_read(tmp_path: Path):
+    (tmp_path / "event.xml").write_text(QUAKEML.replace(">37.0<", ">183.5<"))
+    assert read_event(tmp_path / "event.xml").origins[0].longitude == -176.5
 
 
 @pytest.mark.parametrize("content", [b"", b"<html>", b"\x89HDF\r\n\x1a\n"])

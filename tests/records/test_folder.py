@@ -331,4 +331,16 @@ def test_station_text_that_obspy_refuses_is_a_rejected_file(folder: Path, row):
     (folder / "stations.txt").write_text(f"{header}\n{row}\n")
     (rejection,) = find_stations(folder).rejected
     assert rejection.name == "stations.txt"
-    assert rejection.reasons[0].startswith("is no FDSN station text: ObsPy cannot read it: ")
+    assert rejection.reasons[0].startswith("is no FDSN station text: ")
+
+
+def test_a_wrong_line_of_station_text_costs_no_other_line(folder: Path):
+    header = "#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime"
+    rows = ["XX|A|nan|2|3|Town||", "XX|B|1|2|3|Town||", "XX|C|1|2|high|Town||"]
+    (folder / "stations.txt").write_text("\n".join([header, *rows]))
+    contents = find_stations(folder)
+    assert "B" in [station.code for network in contents.inventory for station in network]
+    (rejection,) = contents.rejected
+    assert rejection.reasons[0] == "line 2: latitude: 'nan', expected a number from -90 to 90"
+    # an elevation is read by ObsPy alone
+    assert rejection.reasons[1].startswith("line 4: ObsPy cannot read it: ")

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import obspy
 import pytest
 from obspy import Inventory, Trace, UTCDateTime
 from obspy.core.inventory import Channel, Network, Response, Station
@@ -104,6 +105,28 @@ def test_an_unreadable_folder_does_not_stop_the_others(archive: Path, monkeypatc
     assert {rejection.name for rejection in contents.rejected} == {"ONE"}
     for rejection in contents.rejected:
         assert rejection.reasons == ("the folder cannot be listed: Permission denied",)
+
+
+@pytest.mark.parametrize(
+    ("codes", "seconds", "reason"),
+    [
+        ({}, -365 * 86400, "holds records of 2018-12-31T23:58:20.000000Z to 2019-"),
+        ({}, 3 * 86400, "under the name of another day"),
+        ({"channel": "HNE"}, 0, "holds records of CI.ONE..HNE under the name of another channel"),
+        ({"station": "TWO"}, 0, "holds records of CI.TWO..HNN under the name of another channel"),
+        ({"location": "00"}, 0, "holds records of CI.ONE.00.HNN under"),
+    ],
+)
+def test_a_file_of_another_day_or_channel_than_its_name_says(archive, codes, seconds, reason):
+    (path,) = archive.glob("2019/CI/ONE/HNN.D/*")
+    (trace,) = obspy.read(path)
+    trace.stats.starttime += seconds
+    trace.stats.update(codes)
+    trace.write(str(path), format="MSEED")
+    stream, (rejection,) = read(archive, "CI.ONE", MIDNIGHT - 10, MIDNIGHT + 50)
+    assert reason in rejection.reasons[0]
+    # the file of the next day serves
+    np.testing.assert_array_equal(stream[0].data, np.arange(20, 51))
 
 
 def test_a_pipe_among_the_day_files_does_not_hang(archive: Path):

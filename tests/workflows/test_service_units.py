@@ -5,10 +5,13 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import matplotlib
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 CHECKOUT = Path(__file__).parents[2]
 UNITS = sorted((CHECKOUT / "workflows" / "systemd").iterdir())
@@ -97,3 +100,60 @@ def test_the_container_runs_the_tested_steps_as_a_user_of_no_rights():
             assert (CHECKOUT / name).exists()
             assert f"!{name}" in ignored
     assert os.access(CHECKOUT / "workflows" / "container" / "install.sh", os.X_OK)
+
+
+def start(folder: Path, cache: Path, **options) -> subprocess.CompletedProcess[str]:
+    """Start a program that prints where its kernels are, as the container does."""
+    program = folder / "bin" / "per-obspy"
+    program.parent.mkdir(exist_ok=True)
+    program.write_text('#!/bin/sh\necho "$NUMBA_CACHE_DIR $*"\n')
+    program.chmod(0o755)
+    script = CHECKOUT / "workflows" / "container" / "install.sh"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "MPLCONFIGDIR": ""}
+    command = [str(script), "start", str(folder), "run", "a b"]
+    return subprocess.run(
+        command, check=True, capture_output=True, text=True, env=environment, **options
+    )
+
+
+def test_the_owner_of_the_kernels_of_the_container_uses_them(tmp_path: Path):
+    (tmp_path / "kernels").mkdir()
+    assert start(tmp_path, tmp_path / "kernels").stdout == f"{tmp_path / 'kernels'} run a b\n"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder to another user")
+def test_another_user_of_the_container_has_kernels_that_nobody_else_writes(tmp_path: Path):
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    (kernels / "a.nbi").write_text("code")
+    os.chown(kernels, 10001, 10001)
+    own = Path(start(tmp_path, kernels).stdout.split()[0])
+    assert own != kernels
+    assert (own / "a.nbi").read_text() == "code"
+    assert own.stat().st_mode & 0o777 == 0o700
+    shutil.rmtree(own)
+
+
+@pytest.mark.parametrize(("mode", "code"), [(0o755, 0), (0o777, 1), (0o757, 1)])
+def test_kernels_that_others_may_write_fail_the_check_of_the_container(tmp_path, mode, code):
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels").chmod(mode)
+    start(tmp_path, tmp_path / "kernels")
+    script = CHECKOUT / "workflows" / "container" / "install.sh"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment |= {"MPLCONFIGDIR": str(tmp_path / "none")}
+    done = subprocess.run([str(script), "check", str(tmp_path)], check=False, env=environment)
+    assert done.returncode == code
+
+
+def test_constraints_name_a_version_of_everything_that_the_container_installs():
+    text = (CHECKOUT / "workflows" / "container" / "constraints.txt").read_text()
+    pins = dict(re.findall(r"(?m)^([a-z0-9-]+)==(\S+)$", text))
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    for line in [*project["dependencies"], *extras["gis"], *extras["notify"], *extras["test"]]:
+        need = Requirement(line)
+        name = canonicalize_name(need.name)
+        if name != "per-obspy":
+            # A version that the project itself refuses could not be installed
+            assert pins[name] in need.specifier

@@ -14,6 +14,7 @@ CODES = {
     "fine": 0,
     "late": TRY_LATER,
     "failing": TRY_LATER,
+    "damaged": TRY_LATER,
     "stopped": TRY_LATER,
     "unfinished": TRY_LATER,
     "nothing_usable": NOTHING_USABLE,
@@ -38,7 +39,8 @@ def status(
     Print the state of a watcher or of a run; the exit code is for monitoring.
 
     0: fine. 2: no folder of a watcher or run. 3: no pair was usable. 75: late, failing,
-    stopped, or unfinished.
+    stopped, unfinished, or results that are not as they were written (the largest
+    are not compared where that takes more than 10 s).
 
     Example: per-obspy status watched --json
     """

@@ -1,11 +1,11 @@
-"""Coordinates and ground of stations from plain text: FDSN station text and tables in CSV."""
+"""Coordinates and ground of stations from tables in CSV."""
 
 import csv
 import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from obspy import Inventory, UTCDateTime
+from obspy import Inventory
 from obspy.core.inventory import Comment, Network, Station
 
 from per_obspy.errors import RecordRejected, printable
@@ -27,9 +27,6 @@ _LARGEST = {"latitude": 90.0, "longitude": 180.0, "elevation": 9000.0, "vs30": 1
 
 #: Beginning of the comment of a station that names the table which describes it.
 SOURCE = "coordinates from "
-
-#: start of an epoch that FDSN station text leaves open
-_OPEN = UTCDateTime(1, 1, 2)
 
 
 class StationRow(NamedTuple):
@@ -234,33 +231,3 @@ def _station(code: str, row: StationRow) -> Station:
     elevation = 0.0 if row.elevation is None else row.elevation
     comments = [Comment(word) for word in words]
     return Station(code, row.latitude, row.longitude, elevation, comments=comments)
-
-
-def marked_open_starts(content: bytes) -> bytes:
-    r"""
-    Return FDSN station text whose empty starts hold a mark, because ObsPy refuses them.
-
-    :func:`with_open_starts` takes the mark away again.
-
-    >>> marked_open_starts(b"#Network|Description|StartTime\nXX|net|")
-    b'#Network|Description|StartTime\nXX|net|0001-01-02T00:00:00.000000Z'
-    """
-    lines = content.decode("utf-8", "replace").splitlines()
-    header = [field.strip().lower() for field in lines[0].lstrip("#").split("|")]
-    start = header.index("starttime") if "starttime" in header else len(header)
-    # Comments stay as they are
-    for index, line in enumerate(lines[1:], 1):
-        fields = line.split("|")
-        if start < len(fields) and not fields[start].strip() and not line.startswith("#"):
-            lines[index] = "|".join((*fields[:start], str(_OPEN), *fields[start + 1 :]))
-    return "\n".join(lines).encode()
-
-
-def with_open_starts(inventory: Inventory) -> Inventory:
-    """Return an inventory just read without the mark of :func:`marked_open_starts`."""
-    for network in inventory:
-        for station in network:
-            for description in (station, *station.channels):
-                if description.start_date == _OPEN:
-                    description.start_date = None
-    return inventory

@@ -18,8 +18,9 @@ from pandas.api.types import is_numeric_dtype
 
 from per_obspy.errors import printable
 
-# Signs of a formula, also in full width; blanks before them and apostrophes as they are written
-_SIGNS = "[=+\\-@\uff1d\uff0b\uff0d\uff20]"
+# Signs of a formula, or of a command (DDE), also in full width; blanks before them and
+# apostrophes as they are written
+_SIGNS = "[=+\\-@|\uff1d\uff0b\uff0d\uff20\uff5c]"
 FORMULA = rf"^'*\s*{_SIGNS}"
 MARKED = rf"^'+\s*{_SIGNS}"
 

@@ -19,7 +19,8 @@ from per_obspy.records.earthquakes.quakeml_events import (
     quakeml_rows,
     read_quakeml,
 )
-from per_obspy.records.fdsn.event_list import EventRow, event_content, listed_events, quakeml_row
+from per_obspy.records.event_file import EventRow, quakeml_row, row_problem
+from per_obspy.records.fdsn.event_list import event_content, listed_events
 from per_obspy.records.fdsn.web import WebPool, web_pool
 
 log = logging.getLogger(__name__)
@@ -32,6 +33,10 @@ _LONGEST_PAUSE = 5.0
 
 #: Changes are asked for from this long before the latest poll, s: clocks differ.
 OVERLAP = 600.0
+
+#: Difference of origin times from which an answer is another earthquake, s (reasoned: revisions
+#: move an origin by less than a minute, aftershocks that are listed come minutes later).
+OTHER_EVENT = 600.0
 
 #: Suffixes of QuakeML files.
 SUFFIXES = (".xml", ".quakeml")
@@ -94,8 +99,7 @@ def read_feed(watch: Watch, state: WatchState, circle: Circle, now: datetime) ->
         rows, problems = _listed(pool, watch, query)
     else:
         rows, problems = _listed_since(pool, watch, query, since)
-    usable, unusable = _usable_rows(rows)
-    return Feed(usable, {}, (*problems, *unusable), {})
+    return Feed({row.event_id: row for row in rows}, {}, tuple(problems), {})
 
 
 def _pool() -> WebPool:
@@ -158,38 +162,6 @@ def _listed(
     return [*rows, *strong], [*problems, *others]
 
 
-def _usable_rows(rows: list[EventRow]) -> tuple[dict[str, EventRow], list[str]]:
-    """Return the rows by identifier, and one problem per row whose values cannot be true."""
-    usable, problems = dict[str, EventRow](), list[str]()
-    for row in rows:
-        if problem := row_problem(row):
-            problems.append(f"{shortened(row.event_id, 80)}: {problem}")
-        else:
-            usable[row.event_id] = row
-    return usable, problems
-
-
-def row_problem(row: EventRow) -> str:
-    """
-    Return the fault in the facts of an earthquake; empty if they are plausible.
-
-    Examples
-    --------
-    >>> row = EventRow("x1", "2026-11-23T01:00:00", 14.6, -90.5, None, None, "", "")
-    >>> row_problem(row), row_problem(row._replace(latitude=float("nan")))
-    ('', 'latitude nan: expected -90 to 90')
-    """
-    limits = {"latitude": (-90.0, 90.0), "longitude": (-180.0, 180.0), "magnitude": (-5.0, 11.0)}
-    for name, (lowest, highest) in limits.items():
-        value = getattr(row, name)
-        if value is not None and not lowest <= value <= highest:
-            return f"{name} {value:g}: expected {lowest:g} to {highest:g}"
-    # A depth that cannot be true is unknown to whoever uses it
-    if row.depth is not None and not -10_000.0 <= row.depth <= 1_000_000.0:
-        return f"depth {row.depth:g} m: expected -10000 to 1000000"
-    return "" if row.event_id.strip() else "has no identifier"
-
-
 def _folder_feed(folder: Path, seen: Mapping[str, tuple[int, int]]) -> Feed:
     """Return the earthquakes of the files of a folder that are new or have changed."""
     feed = Feed({}, {}, (), {})
@@ -202,17 +174,17 @@ def _folder_feed(folder: Path, seen: Mapping[str, tuple[int, int]]) -> Feed:
             continue
         mark = (facts.st_size, facts.st_mtime_ns)
         try:
-            rows = quakeml_rows(path) if seen.get(path.name) != mark else {}
+            rows, faults = quakeml_rows(path) if seen.get(path.name) != mark else ({}, [])
         except CatalogError as error:
             # One that is being written is read at the next poll
             if time.time() - facts.st_mtime >= SETTLED:
                 problems.append(f"{path.name}: {error.problem}")
             continue
+        problems += faults
         feed.rows.update(rows)
         feed.files.update(dict.fromkeys(rows, path.name))
         feed.seen[path.name] = mark
-    usable, unusable = _usable_rows(list(feed.rows.values()))
-    return feed._replace(rows=usable, problems=(*problems, *unusable))
+    return feed._replace(problems=tuple(problems))
 
 
 def _quakeml_files(folder: Path) -> list[Path]:
@@ -240,7 +212,7 @@ class PresentEvent(NamedTuple):
     quakeml: bytes
 
 
-def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None:
+def present_event(watch: Watch, event_id: str, file: str, time: str) -> PresentEvent | None:
     """
     Return the current facts of an earthquake, None if it has been deleted.
 
@@ -252,6 +224,8 @@ def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None
         As the list has it.
     file : str
         Its QuakeML file in the folder, if there is one.
+    time : str
+        Its origin time as it was listed: an answer of another time is another earthquake.
 
     Raises
     ------
@@ -265,12 +239,17 @@ def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None
         event = _event_of_service(watch.service or "", event_id)
     else:
         path = watch.folder / file
-        event = read_quakeml(path).get(event_id) if path.is_file() else None
+        event = read_quakeml(path)[0].get(event_id) if path.is_file() else None
     if event is None:
         return None
     row = quakeml_row(event)._replace(event_id=event_id)
     if problem := row_problem(row):
         raise CatalogError(shortened(event_id, 80), problem)
+    # An update moves an origin by seconds
+    if abs((moment(row.time) - moment(time)).total_seconds()) > OTHER_EVENT:
+        source = public_url(watch.service or str(watch.folder))
+        reason = f"answers for {shortened(event_id, 80)} with an earthquake of {row.time[:19]}"
+        raise ServiceError(f"{source}: {reason}, listed was {time[:19]}")
     return PresentEvent(row, plain_quakeml(event, event_id))
 
 

@@ -73,7 +73,7 @@ def done_task(watcher: Watcher, state: EventState, task: Task) -> Done:
     """
     watch = watch_of(watcher.settings)
     started = iso(watcher.now())
-    present = present_event(watch, state.event_id, state.file)
+    present = present_event(watch, state.event_id, state.file, state.time)
     if present is None:
         return Done(closed(state, DELETED), f"closed: {DELETED}")
     # Its place or magnitude may have changed since it was listed

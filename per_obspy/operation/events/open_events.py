@@ -1,7 +1,7 @@
 """Open earthquakes: relevant ones of the list, until deleted or moved away."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -13,12 +13,15 @@ from per_obspy.files import content_hash
 from per_obspy.operation.events.event_feed import Feed, present_event
 from per_obspy.operation.events.relevance import Places, distances, matters
 from per_obspy.operation.events.state import EventState, changed, iso, moment
-from per_obspy.records.fdsn.event_list import EventRow
+from per_obspy.records.event_file import EventRow
 
 log = logging.getLogger(__name__)
 
 #: Facts by which an earthquake counts as changed.
 FACTS = ("time", "latitude", "longitude", "depth", "magnitude")
+
+#: Ignored earthquakes that are kept for the status, the latest.
+MOST_IGNORED = 1000
 
 #: Reason of an earthquake that its service or file no longer has.
 DELETED = "deleted at its source"
@@ -73,11 +76,11 @@ def closed(state: EventState, reason: str) -> EventState:
     return changed(state, state="closed", reason=reason, not_before=None, failures=0)
 
 
-def listed_states(
-    watch: Watch, places: Places, states: Mapping[str, EventState], feed: Feed, now: datetime
-) -> Iterator[EventState]:
+def judged_feed(
+    watch: Watch, places: Places, states: Container[str], feed: Feed, now: datetime
+) -> list[Listed]:
     """
-    Yield the states that a list opens, updates, closes or opens again.
+    Return the earthquakes of a list, each with the reason for which it has no runs, or none.
 
     Parameters
     ----------
@@ -85,18 +88,45 @@ def listed_states(
         Which earthquakes matter.
     places : Places
         Of the inventory.
-    states : mapping
-        Identifier -> state of every earthquake known so far.
+    states : container of str
+        Identifiers of the earthquakes known so far: an old one of them may be updated.
     feed : Feed
         Earthquakes listed as new or changed.
     now : datetime
         With its zone.
     """
     rows = list(feed.rows.values())
-    for row, reason in zip(rows, judged(watch, places, rows), strict=True):
-        listed = Listed(row, reason, feed.files.get(row.event_id, ""))
-        known = states.get(row.event_id)
-        state = _opened(watch, listed, now) if known is None else _updated(known, listed, now)
+    oldest = now - timedelta(seconds=watch.oldest)
+    judgement = list[Listed]()
+    for row, irrelevance in zip(rows, judged(watch, places, rows), strict=True):
+        # Old ones are listed where a watcher begins, or their magnitude is revised
+        is_old = row.event_id not in states and moment(row.time) < oldest
+        age = f"older than {watch.oldest:g} s (watch.oldest)" if is_old else ""
+        reason = "; ".join(filter(None, (age, irrelevance)))
+        judgement.append(Listed(row, reason, feed.files.get(row.event_id, "")))
+    return judgement
+
+
+def listed_states(
+    watch: Watch, states: Mapping[str, EventState], judgement: list[Listed], now: datetime
+) -> Iterator[EventState]:
+    """
+    Yield the states that a list opens, updates, closes or opens again.
+
+    Parameters
+    ----------
+    watch : Watch
+        With the folder of QuakeML, if there is one.
+    states : mapping
+        Identifier -> state of every earthquake known so far.
+    judgement : list of Listed
+        From :func:`judged_feed`.
+    now : datetime
+        With its zone.
+    """
+    for listed in judgement:
+        known = states.get(listed.row.event_id)
+        state = _opened(listed, now) if known is None else _updated(known, listed, now)
         if state is not None:
             yield state
     # A file that is gone is that of an earthquake that was deleted
@@ -106,17 +136,52 @@ def listed_states(
             yield closed(state, DELETED)
 
 
+def ignored_events(
+    known: Mapping[str, tuple[str, str]],
+    states: Container[str],
+    judgement: list[Listed],
+    files: Container[str],
+) -> dict[str, tuple[str, str]]:
+    """
+    Return the listed earthquakes without runs, and log those that are new or have another reason.
+
+    Parameters
+    ----------
+    known : mapping
+        As stored after the poll before, see ``WatchState.ignored``.
+    states : container of str
+        Identifiers of the earthquakes that have, or had, runs.
+    judgement : list of Listed
+        From :func:`judged_feed`.
+    files : container of str
+        Names of the QuakeML files of the folder.
+    """
+    # Those whose file is gone are gone
+    ignored = {
+        name: entry
+        for name, entry in known.items()
+        if name not in states and (not entry[0] or entry[0] in files)
+    }
+    for row, reason, file in judgement:
+        if row.event_id in states:
+            continue
+        name, line = shortened(row.event_id, 80), f"{in_words(row)}: {reason}"
+        before = ignored.pop(row.event_id, ("", ""))[1]
+        if before != line:
+            log.info("%s: ignored, %s", name, line)
+        ignored[row.event_id] = (file, line)
+    return dict(list(ignored.items())[-MOST_IGNORED:])
+
+
 def _digest(row: EventRow) -> str:
     """Return a hash of the facts of an earthquake by which it counts as changed."""
     return content_hash({name: getattr(row, name) for name in FACTS})[:16]
 
 
-def _opened(watch: Watch, listed: Listed, now: datetime) -> EventState | None:
+def _opened(listed: Listed, now: datetime) -> EventState | None:
     """Return the state of a newly listed earthquake, None if it is irrelevant."""
     row = listed.row
-    # Old ones are listed where a watcher begins, or their magnitude is revised
-    is_old = moment(row.time) < now - timedelta(seconds=watch.oldest)
-    if listed.reason or is_old:
+    if listed.reason:
         return None
     log.info("%s: opened, %s", shortened(row.event_id, 80), in_words(row))
     return EventState(
@@ -178,7 +243,7 @@ def present_state(watch: Watch, places: Places, state: EventState, now: datetime
     PerError
         If the service does not answer, or its answer is not the earthquake.
     """
-    present = present_event(watch, state.event_id, state.file)
+    present = present_event(watch, state.event_id, state.file, state.time)
     if present is None:
         return closed(state, DELETED)
     row, confirmed = present.row, changed(state, confirmed=iso(now))

@@ -17,7 +17,8 @@ from per_obspy.config.section import Moment, Section
 from per_obspy.errors import CatalogError, reason_of, shortened
 from per_obspy.files import written_whole
 from per_obspy.names import inside
-from per_obspy.records.fdsn.event_list import EventRow, file_name
+from per_obspy.records.event_file import EventRow
+from per_obspy.records.fdsn.event_list import file_name
 
 #: State files of a watched folder and of an earthquake.
 WATCH, EVENT = "watch.json", "event.json"
@@ -146,6 +147,11 @@ class WatchState(_State):
         Host of a service -> time before which it is not asked for records, as it demanded.
     seen : dict
         File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
+    judged : str
+        Hash of the settings and places by which earthquakes were opened or ignored.
+    ignored : dict
+        Identifier of a listed earthquake without runs -> its QuakeML file (empty if a service lists
+        it) and its facts with the reason, the latest last.
     """
 
     source: str = ""
@@ -156,6 +162,13 @@ class WatchState(_State):
     last_error: str | None = None
     resting: dict[str, Moment] = Field(default_factory=dict)
     seen: dict[str, tuple[int, int]] = Field(default_factory=dict)
+    judged: str = ""
+    ignored: dict[str, tuple[str, str]] = Field(default_factory=dict)
+
+
+def ignored_lines(state: WatchState) -> tuple[str, ...]:
+    """Return one line per ignored earthquake: identifier, facts and reason."""
+    return tuple(f"{shortened(name, 80)}: {line}" for name, (_, line) in state.ignored.items())
 
 
 def moment(text: str) -> datetime:

@@ -1,6 +1,8 @@
 """Files that describe stations: StationXML, FDSN station text, tables; and other kinds of files."""
 
+import logging
 import re
+from collections.abc import Mapping
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -8,18 +10,23 @@ from pathlib import Path
 import obspy
 from obspy import Inventory
 
-from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, RecordRejected, Rejection, shortened
 from per_obspy.formats.text.itaca_metadata import is_itaca_metadata
 from per_obspy.formats.text.station_table import (
     StationRow,
     is_station_table,
-    marked_open_starts,
     read_station_table,
+)
+from per_obspy.formats.text.station_text import (
+    marked_open_starts,
+    station_lines,
     with_open_starts,
 )
 from per_obspy.records.archives.archive_files import read_file
 from per_obspy.records.contents.file_list import files_below
 from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
+
+log = logging.getLogger(__name__)
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
 #: records -> kind of file
@@ -75,21 +82,69 @@ def _read_inventory(path: Path) -> Inventory:
     """Read StationXML or FDSN station text."""
     content = read_file(path)
     if kind_of(path, content) == "station text":
-        return read_station_text(path, content)
+        inventory, faults = read_station_text(path, content)
+        if faults:
+            log.warning("%s: lines left out: %s", path, shortened("; ".join(faults)))
+        return inventory
     return read_content(obspy.read_inventory, content, path)
 
 
-def read_station_text(path: Path, content: bytes) -> Inventory:
-    """Read FDSN station text, whose empty start means an open one."""
-    marked = marked_open_starts(content)
+def read_station_text(path: Path, content: bytes) -> tuple[Inventory, tuple[str, ...]]:
+    """
+    Read FDSN station text, whose empty start means an open one.
+
+    Returns
+    -------
+    inventory : Inventory
+        Of the lines that can be read.
+    faults : tuple of str
+        One per line that cannot be read.
+
+    Raises
+    ------
+    RecordRejected
+        If no line can be read.
+    """
     try:
-        inventory = read_bytes_with_obspy(
-            obspy.read_inventory, marked, str(path), format="STATIONTXT"
-        )
-    except RecordRejected as rejection:
-        reason = f"is no FDSN station text: {rejection.reasons[0]}"
-        raise RecordRejected(str(path), reason) from rejection
-    return with_open_starts(inventory)
+        faults = {fault.number: fault.reason for fault in station_lines(content)[1]}
+    except ValueError:
+        faults = {}  # a list of networks, or no list at all
+    head, *lines = marked_open_starts(content).decode().split("\n")
+    numbered = {number: line for number, line in enumerate(lines, 2) if line.strip()}
+    for number in faults:
+        numbered.pop(number, None)
+    # Only where the whole cannot be read, line by line for columns that ObsPy alone reads
+    try:
+        inventory = _station_text(path, [head, *numbered.values()])
+    except RecordRejected:
+        faults |= _faults_of_obspy(path, head, numbered)
+        good = [line for number, line in numbered.items() if number not in faults]
+        inventory = _station_text(path, [head, *good])
+    reasons = [f"line {number}: {faults[number]}" for number in sorted(faults)]
+    # A file of which nothing is left is none
+    if reasons and not any(inventory):
+        raise RecordRejected(str(path), *(f"is no FDSN station text: {text}" for text in reasons))
+    return with_open_starts(inventory), tuple(reasons)
+
+
+def _faults_of_obspy(path: Path, head: str, lines: Mapping[int, str]) -> dict[int, str]:
+    """Return the number of each line that ObsPy refuses, and why."""
+    faults = dict[int, str]()
+    for number, line in lines.items():
+        try:
+            _station_text(path, [head, line])
+        except RecordRejected as rejection:
+            faults[number] = rejection.reasons[0]
+    return faults
+
+
+def _station_text(path: Path, lines: list[str]) -> Inventory:
+    """Return the inventory of lines of FDSN station text."""
+    content = "\n".join(lines).encode()
+    inventory: Inventory = read_bytes_with_obspy(
+        obspy.read_inventory, content, str(path), format="STATIONTXT"
+    )
+    return inventory
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:

@@ -21,8 +21,10 @@ from per_obspy.records.earthquakes.groups import (
     EventGroup,
     RecordSpan,
     chosen_group,
+    differ_by_clocks,
     event_groups,
     follows,
+    joining_gap,
     station_files,
 )
 from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
@@ -47,8 +49,10 @@ class OneEarthquake(NamedTuple):
         only a window is read.
     earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
-        (records without a date that are taken for this earthquake), ``screened``, and ``headers``:
-        the earthquake by the headers of its records, see ``earthquakes.header_event``.
+        (records without a date that are taken for this earthquake), ``screened``, ``headers``: the
+        earthquake by the headers of its records, see ``earthquakes.header_event``; and
+        ``joined_by``: the ``records.event_gap``, s, that takes a group for the screened earthquake,
+        from which it may differ by its clocks only; else None.
     """
 
     contents: tuple[tuple[SourceContents, Reader], ...]
@@ -80,14 +84,16 @@ def one_earthquake(
     reader = _reader(records.archives)
     motion = partial(largest_motion, found, reader)
     group = chosen_group(groups, time, source, motion, records.event_gap)
-    facts = [_facts(other, is_screened=other is group) for other in groups]
+    alike = differ_by_clocks(groups, group)
+    gap = joining_gap([group, *alike])
+    facts = [_facts(other, group, gap if other in alike else None) for other in groups]
     # Without an event of the configuration that of the headers counts
     if event is None:
         reader = reader_of_event(reader, group_event(group, records.event_gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
-    rejected = (*found.rejected, *(_rejection(record, group) for record in others))
+    rejected = (*found.rejected, *_rejections(others, group, alike))
     mixed = {record.path for record in others}
     found = found._replace(rejected=rejected)
     return OneEarthquake(_contents(found, group, mixed, reader), facts)
@@ -203,11 +209,25 @@ def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
     return {"start": window[0] - MARGIN, "end": window[1] + MARGIN}
 
 
-def _rejection(record: RecordSpan, screened: EventGroup) -> Rejection:
-    """Return the row of a record of another earthquake."""
-    start = str(record.start)[:16] if record.is_dated else "without a date"
-    reason = f"belongs to another earthquake: starts {start}, the screened one {screened.label}"
-    return Rejection("record", record.record, str(record.path), None, (reason,))
+def _rejections(
+    records: Iterable[RecordSpan], screened: EventGroup, alike: list[EventGroup]
+) -> list[Rejection]:
+    """Return the rows of records that are of another earthquake, or perhaps of another clock."""
+    gap = joining_gap([screened, *alike])
+    by_clock = {record.key for group in alike for record in group.records}
+    rows = list[Rejection]()
+    for record in records:
+        start = str(record.start)[:16] if record.is_dated else "without a date"
+        reason = f"belongs to another earthquake: starts {start}, the screened one {screened.label}"
+        # Whether it is one is for the user to say
+        if record.key in by_clock:
+            reason = (
+                f"starts {start}, the screened records {screened.label}: another earthquake, or "
+                "the same by a clock that differs, as no station has records of both; "
+                f"records.event_gap = {gap:g} takes them as one"
+            )
+        rows.append(Rejection("record", record.record, str(record.path), None, (reason,)))
+    return rows
 
 
 def group_event(group: EventGroup, gap: float = GAP) -> AgreedEvent | None:
@@ -252,8 +272,8 @@ def _warn_of_contradictions(found: AgreedEvent) -> None:
         log.warning(message, len(found.others), found.stations, found.event, shortened(others))
 
 
-def _facts(group: EventGroup, is_screened: bool) -> dict[str, object]:
-    """Return the facts of a group."""
+def _facts(group: EventGroup, screened: EventGroup, gap: float | None) -> dict[str, object]:
+    """Return the facts of a group, with the gap that takes it for the screened one."""
     undated = sum(not record.is_dated for record in group.records)
     by_headers = group_event(group)
     return {
@@ -261,6 +281,7 @@ def _facts(group: EventGroup, is_screened: bool) -> dict[str, object]:
         "stations": group.stations,
         "records": len(group.records),
         "undated": undated,
-        "screened": is_screened,
+        "screened": group is screened,
         "headers": by_headers.facts if by_headers else None,
+        "joined_by": gap,
     }

@@ -13,6 +13,7 @@ one:
   other records of their folder; if these form no group, every group of the folder is taken.
 """
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -23,7 +24,11 @@ from obspy import Trace, UTCDateTime
 from per_obspy.constants import UNSET_DAYS
 from per_obspy.errors import CatalogError
 from per_obspy.formats.knet import knet_event
-from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
+from per_obspy.records.earthquakes.header_event import (
+    HeaderEvent,
+    header_event,
+    same_earthquake,
+)
 
 #: Longest time from the first start of a group to the last, s.
 GAP = 300.0
@@ -209,6 +214,35 @@ def chosen_group(
     largest = max(group.stations for group in groups)
     tied = [group for group in groups if group.stations == largest]
     return tied[0] if len(tied) == 1 else max(reversed(tied), key=motion)
+
+
+def differ_by_clocks(groups: Sequence[EventGroup], screened: EventGroup) -> list[EventGroup]:
+    """
+    Return the groups that may be of the screened earthquake, at stations whose clocks differ.
+
+    They start within a day of it, no station of them has a record of it, and no place or magnitude
+    in their headers contradicts. They may as well be other earthquakes: nothing is joined here.
+    """
+    stations = {record.station for record in screened.records}
+    events = [record.event for record in screened.records if record.event]
+    alike = []
+    for group in groups:
+        if group is screened or not group.start or not screened.start:
+            continue
+        # A time in a header is that of its clock
+        others = [record.event._replace(time=None) for record in group.records if record.event]
+        is_apart = stations.isdisjoint(record.station for record in group.records)
+        is_near = abs(group.start - screened.start) <= _DAY
+        fits = all(same_earthquake(one, other) for one in events for other in others)
+        if is_apart and is_near and fits:
+            alike.append(group)
+    return alike
+
+
+def joining_gap(groups: Sequence[EventGroup]) -> float:
+    """Return the gap, s, with which groups are one: up to the next 100 s."""
+    starts = [record.start for group in groups for record in group.records if record.is_dated]
+    return 100.0 * math.ceil(float(max(starts) - min(starts)) / 100.0)
 
 
 def _started_together(records: Sequence[RecordSpan], gap: float) -> list[list[RecordSpan]]:

@@ -6,38 +6,59 @@ from pathlib import Path
 import obspy
 from obspy.core.event import Catalog, Event, Magnitude, Origin, ResourceIdentifier
 
-from per_obspy.errors import CatalogError, RecordRejected, reason_of
-from per_obspy.records.fdsn.event_list import EventRow, file_name, quakeml_row
+from per_obspy.errors import CatalogError, RecordRejected, reason_of, shortened
+from per_obspy.records.event_file import EventRow, magnitude_of, quakeml_row, row_problem
+from per_obspy.records.fdsn.event_list import file_name
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 #: Bytes of the largest QuakeML file that is read.
 LARGEST_FILE = 64 * 2**20
 
 
-def read_quakeml(path: Path) -> dict[str, Event]:
+def read_quakeml(path: Path) -> tuple[dict[str, Event], list[str]]:
     """
-    Read the earthquakes of a QuakeML file by identifier.
+    Read the earthquakes of a QuakeML file, each alone.
+
+    Returns
+    -------
+    events : dict
+        Identifier -> event whose facts may be true.
+    problems : list of str
+        One per event that has no place or time, or one that cannot be true.
 
     Raises
     ------
     CatalogError
-        If it cannot be read, is too large, is no QuakeML, or an earthquake of it has no place.
+        If it cannot be read, is too large, or is no QuakeML.
     """
     # ObsPy needs many times the size of a file in memory
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise CatalogError(str(path), f"is larger than {LARGEST_FILE} bytes")
-        events = events_of(path.read_bytes(), str(path))
-        return {quakeml_row(event).event_id: event for event in events}
+        found = events_of(path.read_bytes(), str(path))
     except RecordRejected as error:
         raise CatalogError(str(path), f"is no QuakeML: {'; '.join(error.reasons)}") from error
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+    # One earthquake without a place costs no other
+    events, problems = dict[str, Event](), list[str]()
+    for event in found:
+        try:
+            row = quakeml_row(event)
+            problem = row_problem(row)
+        except RecordRejected as error:
+            problem = "; ".join(error.reasons)
+        if problem:
+            problems.append(f"{path.name}: {shortened(str(event.resource_id), 80)}: {problem}")
+        else:
+            events[row.event_id] = event
+    return events, problems
 
 
-def quakeml_rows(path: Path) -> dict[str, EventRow]:
-    """Return the facts of the earthquakes of a QuakeML file; errors of :func:`read_quakeml`."""
-    return {name: quakeml_row(event) for name, event in read_quakeml(path).items()}
+def quakeml_rows(path: Path) -> tuple[dict[str, EventRow], list[str]]:
+    """Return the facts of the earthquakes of a QuakeML file, as :func:`read_quakeml` does."""
+    events, problems = read_quakeml(path)
+    return {name: quakeml_row(event) for name, event in events.items()}, problems
 
 
 def events_of(content: bytes, source: str) -> list[Event]:
@@ -68,7 +89,7 @@ def plain_quakeml(event: Event, event_id: str) -> bytes:
         longitude=found.longitude,
         depth=found.depth,
     )
-    size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    size = magnitude_of(event)
     magnitudes = [] if size is None else [_plain_magnitude(size, name)]
     # ObsPy's own identifiers would be random
     identifier = ResourceIdentifier(f"{name}/event")

@@ -16,12 +16,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-import obspy
 from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
-from per_obspy.errors import RecordRejected, Rejection, ServiceError, shortened
+from per_obspy.errors import Rejection, ServiceError, shortened
 from per_obspy.files import is_part, remove_dead_parts
+from per_obspy.formats.text.station_text import StationLine, station_lines
 from per_obspy.names import SHOWN, code_problem, public_url
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
@@ -30,15 +30,17 @@ from per_obspy.records.fdsn.event_list import fetched_event
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
     Wanted,
+    asked_for,
     digest,
     folder_name,
+    is_inside,
+    other_than_asked,
     station_parameters,
     stations_inside,
     wanted_around,
 )
 from per_obspy.records.fdsn.web import WebPool, answer, host, web_pool
 from per_obspy.records.folder import SourceContents, find_stations
-from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.seedlink.server_address import server_address
 from per_obspy.resume import (
     Status,
@@ -204,20 +206,60 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
     names_with_records = _stems(fetched.folder, "*.mseed")
     names = names_with_records | _stems(fetched.folder, "*.json")
     damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
-    rejected = (*fetched.rejected, *damaged)
+    left_out = _left_out(fetched.folder, sorted(names))
     broken = {row.name for row in damaged}
     # Metadata alone are no station
     if names_with_records <= broken:
-        return SourceContents({}, None, rejected)
+        return SourceContents({}, None, (*fetched.rejected, *damaged, *left_out))
     found = find_stations(fetched.folder)
-    inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
+    others = _others(found, fetched.wanted)
+    usable = stations_inside(found.inventory or Inventory(), fetched.wanted) - broken
+    usable -= {row.name for row in others}
     # Half a file of a killed fetch has another stem
-    stations = {}
-    for name, paths in found.stations.items():
-        whole = tuple(path for path in paths if path.stem == name)
-        if whole and name in inside and name not in broken:
-            stations[name] = whole
+    stations = _whole_stations(found, usable)
+    rejected = (*fetched.rejected, *damaged, *left_out, *others)
     return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _whole_stations(found: SourceContents, usable: set[str]) -> dict[str, tuple[Path, ...]]:
+    """Return the usable stations of a cache with their files, without half-written ones."""
+    files = {
+        name: tuple(path for path in paths if path.stem == name)
+        for name, paths in found.stations.items()
+        if name in usable
+    }
+    return {name: whole for name, whole in files.items() if whole}
+
+
+def _others(found: SourceContents, wanted: Wanted) -> list[Rejection]:
+    """Return a row per cached station whose file holds records of another request."""
+    rows = dict[str, Rejection]()
+    for record in found.records:
+        if is_part(record.path):
+            continue
+        # The name of a file is that of its station
+        station = record.path.stem
+        codes = record.record.split(".")[2:]
+        problem = other_than_asked(wanted, (codes[0], codes[1]), record.start, record.end)
+        if record.station != station and record.path.suffix == ".mseed":
+            problem = f"of another station, {record.station}"
+        if problem:
+            reason = f"its file in the cache holds records {problem}: asked for {asked_for(wanted)}"
+            reason = f"{reason}; remove the file, and it is fetched again"
+            rows.setdefault(
+                station, Rejection("station", station, str(record.path), None, (reason,))
+            )
+    return list(rows.values())
+
+
+def _left_out(folder: Path, names: Iterable[str]) -> list[Rejection]:
+    """Return the rows of records that were left out of the answers of services."""
+    rows = list[Rejection]()
+    for name in names:
+        with suppress(StatusError, TypeError, ValueError):
+            status = read_status(station_status(folder / f"{name}.mseed"))
+            rows += map(Rejection.stored, status.get("left_out", []))
+    return rows
 
 
 def _stems(folder: Path, pattern: str) -> set[str]:
@@ -243,56 +285,75 @@ def _damage(folder: Path, name: str) -> Rejection | None:
 def _offers(
     pool: WebPool, bases: list[str], wanted: Wanted
 ) -> tuple[dict[str, list[Offer]], list[Rejection], list[Rejection]]:
-    """Ask every service which stations it has; return offers, failed services, wrong codes."""
+    """Ask every service which stations it has; return offers, failed services, wrong lines."""
     offers: dict[str, list[Offer]] = defaultdict(list)
     rejected, unusable = [], []
     for base in bases:
         url = f"{base}/fdsnws/station/1/query"
         # A service that fails affects only its stations
         try:
-            listed = _listed(pool, url, wanted)
-        except (ServiceError, RecordRejected) as fault:
+            lines, faults = _listed(pool, url, wanted)
+        except ServiceError as fault:
             rejected.append(Rejection("service", host(url), public_url(url), None, (str(fault),)))
             continue
-        for station in sorted(stations_inside(listed, wanted)):
-            channels = _channels(listed, station)
-            if problem := _problem(station, channels):
-                shown = shortened(station, SHOWN)
-                row = Rejection("station", shown, public_url(url), None, (problem,))
-                unusable.append(row)
-            else:
-                offers[station].append(Offer(base, channels))
+        # Several lines of a station are one offer
+        unusable += faults
+        channels: dict[str, set[tuple[str, str]]] = defaultdict(set)
+        for line in lines:
+            channels[f"{line.network}.{line.station}"].add((line.location, line.channel))
+        for station in sorted(channels):
+            offers[station].append(Offer(base, tuple(sorted(channels[station]))))
     return offers, rejected, unusable
 
 
-def _problem(station: str, channels: Iterable[tuple[str, str]]) -> str:
-    """Return the reason why a station of a list cannot be fetched; empty if it can."""
-    names = station.split(".", 1)
-    problems = [code_problem(*names, *codes) for codes in channels] or [code_problem(*names)]
-    return next(filter(None, problems), "")
+def _listed(pool: WebPool, url: str, wanted: Wanted) -> tuple[list[StationLine], list[Rejection]]:
+    """
+    Return the channels that a service lists of a request, and its lines that cannot be used.
 
-
-def _listed(pool: WebPool, url: str, wanted: Wanted) -> Inventory:
-    """Return the channels that a service has of a request."""
+    Raises ``ServiceError`` if its answer is no list, or one of nothing that was asked for.
+    """
+    # Text is smaller than StationXML by far
+    shown = public_url(url)
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
-        return Inventory()
-    inventory: Inventory = read_bytes_with_obspy(
-        obspy.read_inventory, content, public_url(url), format="STATIONTXT"
-    )
-    return inventory
+        return [], []
+    try:
+        lines, faults = station_lines(content)
+    except ValueError as error:
+        reason = f"answers with data other than a station list: {error}"
+        raise ServiceError(f"{shown}: {reason}") from error
+    asked = [line for line in lines if not _other_line(wanted, line)]
+    # Nothing that was asked for is a fault of the service, not the absence of stations
+    if lines and not asked:
+        others = "; ".join(dict.fromkeys(_other_line(wanted, line) for line in lines))
+        reason = f"lists only stations that were not asked for: {shortened(others, 300)}"
+        raise ServiceError(f"{shown}: {reason}: asked for {asked_for(wanted)}")
+    named, unnamed = _named(asked, shown)
+    rows = [Rejection("station", name, shown, line, (reason,)) for line, name, reason in faults]
+    return named, [*rows, *unnamed]
 
 
-def _channels(inventory: Inventory, station: str) -> tuple[tuple[str, str], ...]:
-    """Return location and channel codes of a station, sorted and each once."""
-    network, code = station.split(".", 1)
-    codes = {
-        (channel.location_code, channel.code)
-        for selected in inventory.select(network=network, station=code)
-        for place in selected
-        for channel in place
-    }
-    return tuple(sorted(codes))
+def _other_line(wanted: Wanted, line: StationLine) -> str:
+    """Return what distinguishes a line of a list from a request; empty if nothing does."""
+    # The place decides before the channel
+    place = (line.latitude, line.longitude)
+    problem = other_than_asked(wanted, (line.location, line.channel), line.start, line.end)
+    if not is_inside(wanted, line.network, line.station, place):
+        problem = f"at {line.latitude:g}, {line.longitude:g}, which the request does not cover"
+    return f"{shortened(f'{line.network}.{line.station}', SHOWN)} {problem}" if problem else ""
+
+
+def _named(lines: list[StationLine], url: str) -> tuple[list[StationLine], list[Rejection]]:
+    """Return the lines of stations whose codes can name a file, and a row per other station."""
+    rows = dict[str, Rejection]()
+    for line in lines:
+        name = f"{line.network}.{line.station}"
+        # The first wrong code of a station is its reason
+        if problem := code_problem(line.network, line.station, line.location, line.channel):
+            row = Rejection("station", shortened(name, SHOWN), url, None, (problem,))
+            rows.setdefault(name, row)
+    named = [line for line in lines if f"{line.network}.{line.station}" not in rows]
+    return named, list(rows.values())
 
 
 def _stations(

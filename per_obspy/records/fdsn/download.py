@@ -1,22 +1,44 @@
-"""Download of one station: records and metadata from the first of several FDSN services."""
+"""
+Download of one station: records and metadata from the first of several FDSN services.
+
+Time, station and channel of every answer are compared with the request.
+"""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
 import obspy
+from obspy import Inventory, Stream
+from obspy.io.mseed.util import get_record_information
 
-from per_obspy.errors import RecordRejected, ServiceError
+from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import inside, public_url
-from per_obspy.records.fdsn.request import Wanted, channel_parameters, digest
-from per_obspy.records.fdsn.web import RequestTooLarge, WebPool, answer, host, whole_answer
+from per_obspy.records.fdsn.request import (
+    Wanted,
+    asked_for,
+    channel_parameters,
+    digest,
+    other_than_asked,
+    stations_inside,
+)
+from per_obspy.records.fdsn.web import (
+    EmptyAnswer,
+    RequestTooLarge,
+    WebPool,
+    answer,
+    host,
+    whole_answer,
+)
 from per_obspy.records.folder import station_name
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.seedlink.seedlink_window import seedlink_window
 from per_obspy.records.seedlink.server_address import ServerAddress
-from per_obspy.resume import StatusError, hash_if_readable, read_status, write_status
+from per_obspy.resume import Status, StatusError, hash_if_readable, read_status, write_status
 
 #: Times that an answer without an announced end is compared with the next.
 _COMPARISONS = 3
@@ -118,6 +140,25 @@ class _NoData(ServiceError):
     """A service answered that it has no data (204)."""
 
 
+class Records(NamedTuple):
+    """
+    Records of an answer that were asked for.
+
+    Attributes
+    ----------
+    content : bytes
+        MiniSEED; empty if the answer holds nothing that was asked for.
+    channels : frozenset of (str, str)
+        Location and channel codes in it.
+    left_out : tuple of Rejection
+        Channels of which records are left out, and why.
+    """
+
+    content: bytes
+    channels: frozenset[tuple[str, str]]
+    left_out: tuple[Rejection, ...] = ()
+
+
 def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> None:
     """Download the records of a station unless they are there."""
     if _is_whole(path, wanted):
@@ -127,16 +168,38 @@ def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> N
     content = _records(pool, url, parameters, offer)
     if not content:
         raise _NoData(f"{host(url)} has no data of the window")
-    found = _channels(content, url, path.stem)
+    records = asked_records(content, url, wanted, path.stem)
+    if not records.content:
+        raise _other(records, url, wanted)
     # A cut at a MiniSEED record loses whole channels: those that are missing are asked for alone
     for codes in offer.channels:
-        if codes not in found:
-            alone = _framed(pool, url, parameters | _selected(codes))
-            if alone and codes not in _channels(alone, url, path.stem):
-                problem = f"answers with data other than channel {'.'.join(codes)}"
-                raise RecordRejected(public_url(url), problem)
-            content += alone
-    _write(path, content, wanted, offer)
+        if codes not in records.channels:
+            records = _with_channel(pool, url, wanted, path.stem, records, codes)
+    _write(path, records.content, wanted, offer, records.left_out)
+
+
+def _with_channel(
+    pool: WebPool,
+    url: str,
+    wanted: Wanted,
+    station: str,
+    records: Records,
+    codes: tuple[str, str],
+) -> Records:
+    """Return the records of a station with those of one more channel, if its service has any."""
+    alone = b""
+    # The other channels are there, so that the service has none of this one
+    with suppress(EmptyAnswer):
+        alone = _framed(pool, url, _parameters(wanted, station) | _selected(codes))
+    if not alone:
+        return records
+    only = wanted._replace(locations=(codes[0] or "--",), channels=(codes[1],))
+    more = asked_records(alone, url, only, station)
+    # Records of another time are those of a gap: the channel has none of the window
+    if not more.content and codes not in {tuple(row.name.split(".")[2:]) for row in more.left_out}:
+        raise _other(more, url, only)
+    left_out = dict.fromkeys((*records.left_out, *more.left_out))
+    return Records(records.content + more.content, records.channels | more.channels, (*left_out,))
 
 
 def _fetch_live(
@@ -149,22 +212,84 @@ def _fetch_live(
     content = seedlink_window(pool, server, path.stem, offer.channels, window)
     if not content:
         raise _NoData(f"{server} has no data of the window")
-    # Records of another station must not enter the cache under this name
-    _channels(content, f"seedlink://{server}", path.stem)
-    _write(path, content, wanted, offer)
+    # Real-time servers confuse channels and times as archives do
+    url = f"seedlink://{server}"
+    records = asked_records(content, url, wanted, path.stem)
+    if not records.content:
+        raise _other(records, url, wanted)
+    _write(path, records.content, wanted, offer, records.left_out)
 
 
-def _channels(content: bytes, url: str, station: str) -> set[tuple[str, str]]:
-    """Return location and channel codes in whole MiniSEED of a station."""
+def asked_records(content: bytes, url: str, wanted: Wanted, station: str) -> Records:
+    """
+    Return the MiniSEED records of an answer that are of the channels and window of a request.
+
+    Parameters
+    ----------
+    content : bytes
+        Answer of a service.
+    url : str
+        Its address, for messages.
+    wanted : Wanted
+        The request.
+    station : str
+        ``"NET.STA"``; another one in the answer is an error, as nothing in it can be trusted.
+
+    Raises
+    ------
+    RecordRejected
+        If it is no MiniSEED, is cut, or is of another station.
+    """
     shown = public_url(url)
     traces = read_bytes_with_obspy(obspy.read, content, shown, format="MSEED")
+    if not traces:
+        raise RecordRejected(shown, "answers without a record")
     # A cut answer ends within a MiniSEED record
     record_length = min(trace.stats.mseed.record_length for trace in traces)
     if surplus := len(content) % record_length:
         problem = f"the answer is cut: its last MiniSEED record has {surplus} bytes"
         raise RecordRejected(shown, problem)
     _check(shown, station, {station_name(trace) for trace in traces})
-    return {(trace.stats.location, trace.stats.channel) for trace in traces}
+    return _divided(content, traces, shown, wanted)
+
+
+def _divided(content: bytes, traces: Stream, url: str, wanted: Wanted) -> Records:
+    """Return the records that were asked for, and one row per channel with others."""
+    others, channels = dict[str, Rejection](), set[tuple[str, str]]()
+    for trace in traces:
+        stats = trace.stats
+        codes = (stats.location, stats.channel)
+        if problem := other_than_asked(wanted, codes, stats.starttime, stats.endtime):
+            reason = f"records {problem}, are left out of the answer: asked for {asked_for(wanted)}"
+            others.setdefault(trace.id, Rejection("record", trace.id, url, None, (reason,)))
+        else:
+            channels.add(codes)
+    # Samples are not coded again
+    if others:
+        content = _without_others(content, wanted)
+    return Records(content, frozenset(channels), tuple(others.values()))
+
+
+def _without_others(content: bytes, wanted: Wanted) -> bytes:
+    """Return the MiniSEED records that are of the channels and window of a request."""
+    # Records of several lengths may follow each other
+    asked, place, file = bytearray(), 0, BytesIO(content)
+    while place < len(content):
+        record = get_record_information(file, place)
+        codes = (record["location"].strip(), record["channel"].strip())
+        length = record["record_length"]
+        if not other_than_asked(wanted, codes, record["starttime"], record["endtime"]):
+            asked += content[place : place + length]
+        place += length
+    return bytes(asked)
+
+
+def _other(records: Records, url: str, wanted: Wanted) -> RecordRejected:
+    """Return the error of an answer that holds nothing that was asked for."""
+    found = "; ".join(
+        f"{row.name} {row.reasons[0].partition(', are')[0]}" for row in records.left_out
+    )
+    return RecordRejected(public_url(url), f"answers with {found}: asked for {asked_for(wanted)}")
 
 
 def _records(pool: WebPool, url: str, parameters: dict[str, str], offer: Offer) -> bytes:
@@ -172,8 +297,16 @@ def _records(pool: WebPool, url: str, parameters: dict[str, str], offer: Offer) 
     try:
         return _framed(pool, url, parameters)
     except RequestTooLarge:
-        each = map(_selected, offer.channels)
-        return b"".join(_framed(pool, url, parameters | codes) for codes in each)
+        pass
+    content, empty = b"", None
+    for codes in offer.channels:
+        try:
+            content += _framed(pool, url, parameters | _selected(codes))
+        except EmptyAnswer as error:
+            empty = error
+    if empty and not content:
+        raise empty
+    return content
 
 
 def _selected(codes: tuple[str, str]) -> dict[str, str]:
@@ -208,7 +341,32 @@ def _fetch_metadata(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> 
     # An answer for another station must not enter the cache under this name
     found = {f"{network.code}.{station.code}" for network in inventory for station in network}
     _check(shown, path.stem, found)
+    _check_metadata(shown, inventory, wanted)
     _write(path, content, wanted, offer)
+
+
+def _check_metadata(url: str, inventory: Inventory, wanted: Wanted) -> None:
+    """Refuse metadata of another place, or without a channel of the request in its window."""
+    if not stations_inside(inventory, wanted):
+        (station, *_) = (station for network in inventory for station in network)
+        place = f"{station.latitude:g}, {station.longitude:g}"
+        problem = f"answers with a station at {place}, outside the circle of the request"
+        raise RecordRejected(url, problem)
+    # Channels that were not asked for may be there as well
+    channels = [channel for network in inventory for station in network for channel in station]
+    problems = [
+        other_than_asked(
+            wanted,
+            (channel.location_code, channel.code),
+            channel.start_date,
+            channel.end_date,
+        )
+        for channel in channels
+    ]
+    if all(problems):
+        found = problems[0] if problems else "without a channel"
+        problem = f"answers with metadata {found}: asked for {asked_for(wanted)}"
+        raise RecordRejected(url, problem)
 
 
 def _parameters(wanted: Wanted, station: str) -> dict[str, str]:
@@ -225,14 +383,27 @@ def _check(url: str, station: str, found: set[str]) -> None:
         )
 
 
-def _write(path: Path, content: bytes, wanted: Wanted, offer: Offer) -> None:
+def _write(
+    path: Path,
+    content: bytes,
+    wanted: Wanted,
+    offer: Offer,
+    left_out: Sequence[Rejection] = (),
+) -> None:
     """Write a file of a station, and then its hash into the status of the station."""
-    outputs = {name: known for name, known in _outputs(path, wanted).items() if name != path.name}
+    before = _status(path, wanted)
+    outputs = {name: known for name, known in before["outputs"].items() if name != path.name}
     with written_whole(path) as part:
         part.write_bytes(content)
     outputs[path.name] = bytes_hash(content)
+    # Metadata come after the records
+    rows = [*left_out] if path.suffix == ".mseed" else before.get("left_out", [])
     # The word shard makes the status a description, which a folder of records passes over
-    facts = {"shard": outputs.get(f"{path.stem}.mseed"), "channels": offer.channels}
+    facts = {
+        "shard": outputs.get(f"{path.stem}.mseed"),
+        "channels": offer.channels,
+        "left_out": rows,
+    }
     write_status(station_status(path), _key(path, wanted), outputs, facts)
 
 
@@ -243,17 +414,18 @@ def station_status(path: Path) -> Path:
 
 def _is_whole(path: Path, wanted: Wanted) -> bool:
     """Return whether a file is as it was fetched by the same request."""
-    known = _outputs(path, wanted).get(path.name)
+    known = _status(path, wanted)["outputs"].get(path.name)
     return bool(known) and hash_if_readable(path) == known
 
 
-def _outputs(path: Path, wanted: Wanted) -> dict[str, str]:
-    """Return the hashes in the status of a station; empty if it is missing or of other work."""
+def _status(path: Path, wanted: Wanted) -> Status:
+    """Return the status of a station, one without outputs if it is missing or of other work."""
+    empty: Status = {"outputs": {}}
     try:
         status = read_status(station_status(path))
     except StatusError:
-        return {}
-    return dict(status["outputs"]) if status["key"] == _key(path, wanted) else {}
+        return empty
+    return status if status["key"] == _key(path, wanted) else empty
 
 
 def _key(path: Path, wanted: Wanted) -> str:

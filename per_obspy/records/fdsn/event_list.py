@@ -1,11 +1,12 @@
 """Lists of earthquakes from QuakeML files, FDSN event services and GeoJSON feeds of the USGS."""
 
-import csv
 import json
-from collections.abc import Callable, Mapping
+import logging
+import re
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import obspy
 from obspy import UTCDateTime
@@ -15,7 +16,13 @@ from obspy.geodetics import locations2degrees
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, shortened
 from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import LONGEST_CODE, code_problem, inside, public_url
-from per_obspy.records.event_file import read_event
+from per_obspy.records.event_file import (
+    EventRow,
+    iso_time,
+    quakeml_row,
+    read_event,
+    row_problem,
+)
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, WebPool, answer, web_pool
@@ -26,34 +33,10 @@ from per_obspy.resume import earlier_status, write_status
 _PATIENCE = (60.0, 3, 1.0)
 
 
-class EventRow(NamedTuple):
-    """
-    One earthquake of a list.
+log = logging.getLogger(__name__)
 
-    Attributes
-    ----------
-    event_id : str
-        As its service names it; ``records.fdsn.event_id`` takes it.
-    time : str
-        Origin time, ISO 8601, UTC.
-    latitude, longitude : float
-        Of the epicentre, degrees.
-    depth : float or None
-        m.
-    magnitude : float or None
-    magnitude_type : str
-    place : str
-    """
-
-    event_id: str
-    time: str
-    latitude: float
-    longitude: float
-    depth: float | None
-    magnitude: float | None
-    magnitude_type: str
-    place: str
-
+#: Columns of the text format of fdsnws-event 1.2.
+_TEXT_COLUMNS = 13
 
 #: Parameters of the circle in which epicentres are wanted.
 _CIRCLE = ("latitude", "longitude", "maxradius")
@@ -93,11 +76,21 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         raise CatalogError(source, "no such file")
     else:
         # Everything else is the base URL or the name of an event service, which selects itself
-        for name in ("starttime", "endtime"):
-            _time(public_url(source), name, query)
-        url = f"{base_url(source)}/fdsnws/event/1/query"
-        rows = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
+        rows = _rows_of_service(source, query)
     return sorted(rows, key=lambda row: row.time, reverse=True)
+
+
+def _rows_of_service(source: str, query: Mapping[str, str]) -> list[EventRow]:
+    """Return the earthquakes that an event service lists of a query."""
+    start, end = (_time(public_url(source), name, query) for name in ("starttime", "endtime"))
+    url = f"{base_url(source)}/fdsnws/event/1/query"
+    listed = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
+    rows = [row for row in listed if _is_between(row, start, end)]
+    # A service may pass over a parameter that it does not know
+    if len(rows) < len(listed):
+        count = len(listed) - len(rows)
+        log.warning("%s: %d earthquakes of another time left out", public_url(url), count)
+    return rows
 
 
 def listed_events(
@@ -129,22 +122,16 @@ def listed_events(
     ServiceError
         If the service does not answer, or its answer is no list.
     """
+    # "Not found" is the answer of some services to an empty list
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
-        cells = _text_cells(answer(pool, url, {**query, "format": "text"}))
+        rows, problems = _text_rows(answer(pool, url, {**query, "format": "text"}))
     except NotFound:
         return [], []
-    except (ValueError, csv.Error) as error:
+    except ValueError as error:
         reason = f"answer is no list of events: {_reason(error)}"
         raise ServiceError(f"{public_url(url)}: {reason}") from error
-    # Each line is read alone
-    rows, problems = [], []
-    for line in cells:
-        try:
-            rows.append(_text_row(line))
-        except (ValueError, TypeError, IndexError) as error:
-            problems.append(f"{public_url(url)}: {shortened('|'.join(line), 80)}: {_reason(error)}")
-    return rows, problems
+    return rows, [f"{public_url(url)}: {problem}" for problem in problems]
 
 
 def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], bool]:
@@ -176,14 +163,19 @@ def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], boo
     smallest = float(query.get("minmagnitude", "-inf"))
 
     def select(row: EventRow) -> bool:
-        time = UTCDateTime(row.time)
-        if (start and time < start) or (end and time > end):
+        if not _is_between(row, start, end):
             return False
         if "minmagnitude" in query and (row.magnitude is None or row.magnitude < smallest):
             return False
         return not circle or _distance(row, *circle[:2]) <= circle[2]
 
     return select
+
+
+def _is_between(row: EventRow, start: UTCDateTime | None, end: UTCDateTime | None) -> bool:
+    """Return whether the origin time of an earthquake is in a window; None is open."""
+    time = UTCDateTime(row.time)
+    return (start is None or time >= start) and (end is None or time <= end)
 
 
 def _time(source: str, name: str, query: Mapping[str, str]) -> UTCDateTime | None:
@@ -279,37 +271,86 @@ def file_name(event_id: str) -> str:
     return f"{name[:LONGEST_CODE]}-{digest(event_id)}"
 
 
+#: Earthquakes of a list, and one problem per line or entry of it that cannot be read.
+Listed = tuple[list[EventRow], list[str]]
+
+
 def _rows_of_file(path: Path) -> list[EventRow]:
     """Return the earthquakes of a GeoJSON or QuakeML file."""
     content = path.read_bytes()
     try:
         if content.lstrip()[:1] == b"{":
-            return _feed_rows(content)
-        return [quakeml_row(event) for event in read_with_obspy(obspy.read_events, path)]
-    except (RecordRejected, ValueError, KeyError, TypeError, IndexError) as error:
+            listed = _feed_rows(content)
+        else:
+            listed = _each(quakeml_row, read_with_obspy(obspy.read_events, path), _event_name)
+        return _rows_with_warnings(str(path), listed)
+    except (RecordRejected, ValueError, KeyError, TypeError) as error:
         raise CatalogError(str(path), f"is no list of events: {_reason(error)}") from error
 
 
 def _rows_of_answer(
-    url: str, rows: Callable[[bytes], list[EventRow]], query: Mapping[str, str]
+    url: str, rows: Callable[[bytes], Listed], query: Mapping[str, str]
 ) -> list[EventRow]:
     """Return the earthquakes in the answer of a service or feed."""
     content = answer(web_pool(*_PATIENCE), url, query)
     try:
-        return rows(content)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+        return _rows_with_warnings(public_url(url), rows(content))
+    except (ValueError, KeyError, TypeError) as error:
         reason = f"answers with data other than a list of events: {_reason(error)}"
         raise ServiceError(f"{public_url(url)}: {reason}") from error
 
 
+def _rows_with_warnings(source: str, listed: Listed) -> list[EventRow]:
+    """Return the earthquakes of a list; its problems are warnings, an error if nothing else is."""
+    rows, problems = listed
+    if problems and not rows:
+        raise ValueError(problems[0])
+    for problem in problems:
+        log.warning("%s: left out: %s", source, problem)
+    return rows
+
+
+def _each(
+    read: Callable[[Any], EventRow], entries: Iterable[Any], name: Callable[[Any], str]
+) -> Listed:
+    """Read every entry of a list alone; a fact that cannot be true is a problem of its entry."""
+    rows, problems = list[EventRow](), list[str]()
+    for entry in entries:
+        try:
+            row = read(entry)
+        except (
+            RecordRejected,
+            ValueError,
+            KeyError,
+            TypeError,
+            IndexError,
+            OverflowError,
+        ) as error:
+            problems.append(f"{shortened(name(entry), 80)}: {_reason(error)}")
+            continue
+        # A number that can be read may still be no place
+        if problem := row_problem(row):
+            problems.append(f"{shortened(name(entry), 80)}: {problem}")
+        else:
+            rows.append(row)
+    return rows, problems
+
+
+def _event_name(event: Event) -> str:
+    """Return the identifier of an earthquake in QuakeML."""
+    return str(event.resource_id)
+
+
 def _reason(error: Exception) -> str:
     """Return the message of an error, with its class if it is one of Python."""
+    if isinstance(error, RecordRejected):
+        return "; ".join(error.reasons)
     return str(error) if isinstance(error, PerError) else f"{type(error).__name__}: {error}"
 
 
-def _feed_rows(content: bytes) -> list[EventRow]:
+def _feed_rows(content: bytes) -> Listed:
     """Return the earthquakes of a GeoJSON feed: time in ms, depth in km."""
-    return [_feed_row(feature) for feature in json.loads(content)["features"]]
+    return _each(_feed_row, json.loads(content)["features"], str)
 
 
 def _feed_row(feature: dict[str, Any]) -> EventRow:
@@ -319,7 +360,7 @@ def _feed_row(feature: dict[str, Any]) -> EventRow:
     # A feed leaves out or nulls values that its network does not know
     return EventRow(
         event_id=feature["id"],
-        time=_iso(UTCDateTime(properties["time"] / 1000)),
+        time=iso_time(UTCDateTime(properties["time"] / 1000)),
         latitude=float(latitude),
         longitude=float(longitude),
         depth=1000 * depth[0] if depth and depth[0] is not None else None,
@@ -329,32 +370,28 @@ def _feed_row(feature: dict[str, Any]) -> EventRow:
     )
 
 
-def _text_rows(content: bytes) -> list[EventRow]:
+def _text_rows(content: bytes) -> Listed:
     """Return the earthquakes in the text format of fdsnws-event 1.2: 13 columns or more."""
-    return [_text_row(row) for row in _text_cells(content)]
-
-
-def _text_cells(content: bytes) -> list[list[str]]:
-    """Return the cells of every line of the text format below its header."""
-    lines = content.decode("utf-8").splitlines()
-    if not lines:
-        return []
-    header, *rows = csv.reader(lines, delimiter="|", quoting=csv.QUOTE_NONE)
+    # Names of places may hold line ends of other alphabets, which divide no lines
+    text = content.decode("utf-8", "replace")
+    lines = [line for line in re.split("\r\n|\r|\n", text) if line.strip()]
     # A web page or an error text of the service has another first line
-    if not header or not header[0].lstrip("# ").startswith("EventID"):
-        raise ValueError(f"the first line is {'|'.join(header):.80}")
-    return [row for row in rows if row]
+    if lines and not lines[0].lstrip("\ufeff# ").startswith("EventID"):
+        raise ValueError(f"the first line is {lines[0]:.80}")
+    return _each(_text_row, lines[1:], str)
 
 
-def _text_row(row: list[str]) -> EventRow:
+def _text_row(line: str) -> EventRow:
     """Return one earthquake of the text format, depth from km to m."""
-    cells = [cell.strip() for cell in row]
+    cells = [cell.strip() for cell in line.split("|")]
+    if len(cells) < _TEXT_COLUMNS:
+        raise RecordRejected(line, f"has {len(cells)} columns, expected {_TEXT_COLUMNS}")
     # Between them are author, catalogue and contributor
     event_id, time, latitude, longitude, depth = cells[:5]
     magnitude_type, magnitude = cells[9:11]
     return EventRow(
         event_id,
-        _iso(UTCDateTime(time)),
+        iso_time(UTCDateTime(time)),
         float(latitude),
         float(longitude),
         1000 * float(depth) if depth else None,
@@ -362,31 +399,3 @@ def _text_row(row: list[str]) -> EventRow:
         magnitude_type,
         cells[12],
     )
-
-
-def quakeml_row(event: Event) -> EventRow:
-    """Return one earthquake of a QuakeML file, from its preferred origin and magnitude."""
-    name = str(event.resource_id)
-    if not event.origins:
-        raise RecordRejected(name, "has no origin")
-    origin = event.preferred_origin() or event.origins[0]
-    if None in (origin.time, origin.latitude, origin.longitude):
-        raise RecordRejected(name, "has an origin without time, latitude or longitude")
-    # Magnitude and place may be unknown
-    size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
-    descriptions = event.event_descriptions
-    return EventRow(
-        name.rpartition("/")[2],
-        _iso(origin.time),
-        float(origin.latitude),
-        float(origin.longitude),
-        origin.depth,
-        float(size.mag) if size else None,
-        (size.magnitude_type or "") if size else "",
-        descriptions[0].text if descriptions else "",
-    )
-
-
-def _iso(time: UTCDateTime) -> str:
-    """Return a time in ISO 8601 to the millisecond."""
-    return str(time.datetime.isoformat(timespec="milliseconds"))

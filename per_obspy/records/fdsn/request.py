@@ -1,4 +1,4 @@
-"""Requests to FDSN services: stations, channels and time window."""
+"""Requests to FDSN services (stations, channels, time window), and whether an answer is of one."""
 
 import hashlib
 from collections.abc import Iterable
@@ -7,11 +7,14 @@ from typing import NamedTuple
 
 from obspy import Inventory, UTCDateTime
 from obspy.core.event import Event, Origin
-from obspy.core.inventory import Station
 from obspy.geodetics import kilometers2degrees, locations2degrees
 
 from per_obspy import config
 from per_obspy.errors import CatalogError
+
+#: Time of an answer before and after the window that is no fault, s: services cut at whole MiniSEED
+#: records (reasoned: those of strong motion are shorter).
+MARGIN = 60.0
 
 
 class Wanted(NamedTuple):
@@ -128,24 +131,67 @@ def digest(content: object) -> str:
 
 def stations_inside(inventory: Inventory, wanted: Wanted) -> set[str]:
     """Return the stations of an inventory, ``"NET.STA"``, that a request covers."""
-    inside = set()
-    for network in inventory:
-        if not _matches(network.code, wanted.networks):
-            continue
-        for station in network:
-            matches = _matches(station.code, wanted.stations)
-            if matches and _distance(wanted, station) <= wanted.radius:
-                inside.add(f"{network.code}.{station.code}")
-    return inside
+    return {
+        f"{network.code}.{station.code}"
+        for network in inventory
+        for station in network
+        if is_inside(wanted, network.code, station.code, (station.latitude, station.longitude))
+    }
+
+
+def is_inside(wanted: Wanted, network: str, station: str, place: tuple[float, float]) -> bool:
+    """Return whether a request covers a station at a latitude and longitude, degrees."""
+    if not _matches(network, wanted.networks) or not _matches(station, wanted.stations):
+        return False
+    return bool(locations2degrees(wanted.latitude, wanted.longitude, *place) <= wanted.radius)
+
+
+def other_than_asked(
+    wanted: Wanted,
+    codes: tuple[str, str],
+    start: UTCDateTime | None,
+    end: UTCDateTime | None,
+) -> str:
+    """
+    Return what distinguishes records or metadata of a channel from a request; empty if nothing.
+
+    Parameters
+    ----------
+    wanted : Wanted
+        Channels and window.
+    codes : (str, str)
+        Location and channel code of the answer.
+    start, end : UTCDateTime or None
+        Of the answer; None is open.
+
+    Examples
+    --------
+    >>> start, end = UTCDateTime(2023, 2, 6, 1, 17), UTCDateTime(2023, 2, 6, 1, 22)
+    >>> wanted = Wanted(37.2, 37.0, 1.0, start, end, ("*",), ("*",), ("*",), ("HN?",))
+    >>> other_than_asked(wanted, ("", "HNZ"), start + 30, end + 900)
+    ''
+    >>> other_than_asked(wanted, ("", "HNZ"), UTCDateTime(2022, 2, 6), UTCDateTime(2022, 2, 7))
+    'of another time, 2022-02-06T00:00:00 to 2022-02-07T00:00:00'
+    >>> other_than_asked(wanted, ("00", "BHZ"), start, end)
+    'of another channel, 00.BHZ'
+    """
+    location, channel = codes
+    # An empty location is asked for by dashes
+    is_channel = _matches(channel, wanted.channels)
+    if not is_channel or not _matches(location or "--", wanted.locations):
+        return f"of another channel, {location}.{channel}"
+    if (start and start > wanted.end + MARGIN) or (end and end < wanted.start - MARGIN):
+        first, last = (str(time)[:19] if time else "open" for time in (start, end))
+        return f"of another time, {first} to {last}"
+    return ""
+
+
+def asked_for(wanted: Wanted) -> str:
+    """Return window and channels of a request in words, for messages."""
+    times = " to ".join(str(time)[:19] for time in (wanted.start, wanted.end))
+    return f"{','.join(wanted.channels)} from {times}"
 
 
 def _matches(code: str, patterns: Iterable[str]) -> bool:
     """Check whether a code fits one of the patterns."""
     return any(fnmatchcase(code, pattern) for pattern in patterns)
-
-
-def _distance(wanted: Wanted, station: Station) -> float:
-    """Return the distance from the centre, degrees."""
-    return float(
-        locations2degrees(wanted.latitude, wanted.longitude, station.latitude, station.longitude)
-    )

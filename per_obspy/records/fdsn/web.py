@@ -49,6 +49,10 @@ class RequestTooLarge(ServiceError):
     """A service refuses to answer that much at once."""
 
 
+class EmptyAnswer(ServiceError):
+    """A service answers 200 without content; where it has no data it should answer 204."""
+
+
 class PassingFault(ServiceError):
     """A fault that may pass, with the pause in s that the service demands, None if it does not."""
 
@@ -150,6 +154,8 @@ def whole_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answ
         404, which FDSN services do not use for "no data" unless a request demands it.
     RequestTooLarge
         If the request must be divided (413, 414).
+    EmptyAnswer
+        200 without content, which may be a fault: it is no proof that there are no data.
     ServiceError
         If there is no answer, it takes too long or is too large, or it is another fault.
     """
@@ -271,6 +277,9 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
             raise ServiceError(f"{shown}: the answer is larger than {pool.largest} bytes")
         if time.monotonic() > until:
             raise ServiceError(f"{shown}: no whole answer within {pool.longest:g} s")
+    if not content or content.isspace():
+        reason = 'an empty answer (HTTP 200), which is not "no data" (HTTP 204)'
+        raise EmptyAnswer(f"{shown}: {reason}: asked again later")
     names = {name.lower() for name in response.headers}
     is_framed = bool(names & {"content-length", "transfer-encoding"})
     return Answer(bytes(content), is_framed)

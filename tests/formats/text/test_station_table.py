@@ -1,8 +1,5 @@
 """Coordinates of stations from plain text."""
 
-from io import BytesIO
-
-import obspy
 import pytest
 
 from per_obspy.errors import RecordRejected
@@ -10,9 +7,7 @@ from per_obspy.formats.text.station_table import (
     StationRow,
     is_station_table,
     located_stations,
-    marked_open_starts,
     read_station_table,
-    with_open_starts,
 )
 
 TABLE = "Network,Station,LATITUDE,Longitude,Elevation\nxx,Some Town,-33.5,-71.25,12\n"
@@ -49,12 +44,3 @@ def test_a_table_serves_its_networks_only():
     rows = [StationRow("XX", ("A",), 1.0, 2.0, 3.0)]
     found = located_stations(rows, ["XX.A", ".A", "YY.A", "XX.B"])
     assert [network.code for network in found] == ["XX", ""]
-
-
-def test_an_empty_start_of_station_text_is_open():
-    header = "#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime"
-    text = f"{header}\nXX|A|1|2|3|Town||\nXX|B|1|2|3|Town|2001-02-03T00:00:00|\n"
-    marked = BytesIO(marked_open_starts(text.encode()))
-    first, second = with_open_starts(obspy.read_inventory(marked, format="STATIONTXT"))[0]
-    assert first.start_date is None
-    assert second.start_date.year == 2001

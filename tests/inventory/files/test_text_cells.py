@@ -10,7 +10,7 @@ from per_obspy.inventory.files.writing import write_pairs
 
 TEXTS = [
     "=1", "+a", "-", "@x", "'=1", "''=1", " =1", "\t=1", "\r+x", "\x00=", "\uff1d1", "-\u0661",
-    "-1", "+1e5", "-inf", "'s", "", "a\nb", "a\u202eb", "plain", "'", "'-1",
+    "|cmd", "\uff5cx", "-1", "+1e5", "-inf", "'s", "", "a\nb", "a\u202eb", "plain", "'", "'-1",
 ]  # fmt: skip
 
 
@@ -25,7 +25,9 @@ def test_columns_and_single_texts_agree():
 def test_a_text_is_read_as_it_was_but_for_unprintable_characters(text):
     assert given_text(cell(text)) == cell("x" + text)[1:]
     is_number = cell(text).lstrip("+-")[:1].isascii() and cell(text).lstrip("+-")[:1].isdecimal()
-    assert is_number or not cell(text).strip().startswith(("=", "+", "-", "@", "\uff1d"))
+    assert is_number or not cell(text).strip().startswith(
+        ("=", "+", "-", "@", "|", "\uff1d", "\uff5c")
+    )
 
 
 def test_numbers_and_empty_cells_stay():

@@ -122,3 +122,22 @@ def test_ridgecrest_next_to_other_earthquakes(real_data: Path, tmp_path: Path):
     others = [row for row in sources.rejected if "another earthquake" in row.reasons[0]]
     # AFAD 4 and COSMOS 8 records
     assert len(others) == 12
+
+
+@pytest.mark.real_data
+def test_maule_s_clocks_are_no_other_earthquakes_for_sure(real_data: Path):
+    # RENADIC's files are of one earthquake; clocks were an hour off, or never set
+    folder = real_data / "records" / "maule2010_renadic"
+    sources = screened(folder)
+    joined = {group["start"]: group["joined_by"] for group in sources.earthquakes}
+    assert joined == {
+        "2010-02-27T02:45": 4300.0,
+        "2010-02-27T03:38": 4300.0,
+        "2010-02-27T03:54": None,
+    }
+    reasons = {row.reasons[0] for row in sources.rejected if row.kind == "record"}
+    assert not any("belongs to another earthquake" in reason for reason in reasons)
+    assert all("records.event_gap = 4300 takes them as one" in reason for reason in reasons)
+    # with that gap all seven stations are read
+    (group,) = screened(folder, event_gap=4300.0).earthquakes
+    assert (group["stations"], group["screened"]) == (7, True)

@@ -11,10 +11,13 @@ from per_obspy.records.earthquakes.groups import (
     EventGroup,
     RecordSpan,
     chosen_group,
+    differ_by_clocks,
     event_groups,
+    joining_gap,
     record_span,
     station_files,
 )
+from per_obspy.records.earthquakes.header_event import HeaderEvent
 
 MAIN = UTCDateTime(2019, 7, 6, 3, 19, 53)
 FORE = UTCDateTime(2019, 7, 4, 17, 33, 49)
@@ -56,6 +59,30 @@ def test_wrong_clocks_need_a_longer_gap():
     records = [span("N.A", MAIN), span("N.B", MAIN + 3200), span("N.C", MAIN + 4200)]
     assert len(event_groups(records)) == 3
     assert len(event_groups(records, gap=5400.0)) == 1
+
+
+def test_groups_of_other_stations_within_a_day_may_differ_by_their_clocks_only():
+    main = [span("N.A", MAIN), span("N.B", MAIN + 10)]
+    hour = [span("N.C", MAIN - 4100)]
+    # a station with records of both, or days between them, is of another earthquake
+    both, days = [span("N.A", MAIN + 9000)], [span("N.D", MAIN + 3 * 86400)]
+    groups = event_groups([*main, *hour, *both, *days])
+    screened = next(group for group in groups if group.start == MAIN)
+    (alike,) = differ_by_clocks(groups, screened)
+    assert {record.station for record in alike.records} == {"N.C"}
+    gap = joining_gap([alike, screened])
+    assert gap == 4200.0
+    assert {"N.A", "N.B", "N.C"} in stations(event_groups([*main, *hour], gap))
+
+
+@pytest.mark.parametrize(
+    ("event", "expected"),
+    [(HeaderEvent(magnitude=8.5), 1), (HeaderEvent(magnitude=5.0), 0), (None, 1)],
+)
+def test_another_magnitude_in_a_header_is_another_earthquake(event, expected):
+    main = span("N.A", MAIN)._replace(event=HeaderEvent(str(MAIN), magnitude=8.8))
+    groups = event_groups([main, span("N.B", MAIN + 4000)._replace(event=event)])
+    assert len(differ_by_clocks(groups, groups[0])) == expected
 
 
 def test_a_continuous_record_joins_every_group_that_it_overlaps():

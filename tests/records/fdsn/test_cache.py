@@ -13,17 +13,20 @@ import numpy as np
 import pytest
 from fdsn_server import (
     FdsnServer,
+    changed,
     content,
     cut,
     dripping,
+    empty,
     late,
+    moved,
     mseed,
     serving,
     shortened,
     stalled,
     status,
 )
-from obspy import UTCDateTime
+from obspy import Stream, UTCDateTime, read
 
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.errors import CatalogError, ServiceError
@@ -269,6 +272,108 @@ def test_another_stations_records_are_refused(server: FdsnServer, ask: Ask):
     assert "answers with XX.S001 instead of XX.S002" in rejection.reasons[0]
     # wrong content is no reason to ask again at once
     assert server.asked("dataselect", "S002") == 1
+
+
+def test_records_of_another_year_are_refused_and_counted(server: FdsnServer, ask: Ask):
+    for name in STATIONS[1:]:
+        server.fail("dataselect", name[3:], changed(moved(-365 * 86400.0)))
+    first = ask()
+    assert names(first) == STATIONS[:1]
+    rows = fetched_stations(first).rejected
+    assert [row.name for row in rows] == STATIONS[1:]
+    assert all("of another time" in row.reasons[0] for row in rows)
+    # the fault may pass: the rest is asked for again, and only that
+    assert not first.is_complete
+    assert names(ask()) == STATIONS
+    assert server.asked("dataselect", "S001") == 1
+
+
+def test_an_empty_answer_is_asked_again_and_no_answer_of_no_data(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", empty)
+    first = ask()
+    (row,) = first.rejected
+    assert (row.name, first.is_complete) == ("XX.S002", False)
+    assert 'which is not "no data"' in row.reasons[0]
+    assert names(ask()) == STATIONS
+
+
+@pytest.mark.parametrize("subject", ["station", "event"])
+def test_an_empty_list_or_event_is_no_answer(server: FdsnServer, ask: Ask, subject: str):
+    server.fail(subject, "*", empty)
+    with pytest.raises(ServiceError, match='which is not "no data"'):
+        ask()
+    assert names(ask()) == STATIONS
+
+
+def test_a_file_in_the_cache_of_another_time_is_a_row(ask: Ask):
+    fetched = ask()
+    # As a version that did not compare has left it: the hash is right, the year is not
+    file = fetched.folder / "XX.S002.mseed"
+    file.write_bytes(mseed(moved(-365 * 86400.0)(read(str(file)))))
+    status_file = file.with_suffix(".json")
+    known = json.loads(status_file.read_text())
+    known["outputs"][file.name] = file_hash(file)
+    status_file.write_text(json.dumps(known))
+    contents = fetched_stations(fetched)
+    assert list(contents.stations) == [name for name in STATIONS if name != "XX.S002"]
+    (row,) = contents.rejected
+    assert (row.name, "of another time" in row.reasons[0]) == ("XX.S002", True)
+
+
+def test_channels_that_are_left_out_of_an_answer_are_rows(server: FdsnServer, ask: Ask):
+    def with_stray(stream):
+        stray = stream[0].copy()
+        stray.stats.starttime -= 5 * 3600
+        return Stream([stray, *stream])
+
+    server.fail("dataselect", "S003", changed(with_stray))
+    for fetched in (ask(), ask()):
+        contents = fetched_stations(fetched)
+        assert list(contents.stations) == STATIONS
+        (row,) = contents.rejected
+        assert (row.kind, row.name[:7]) == ("record", "XX.S003")
+        assert "are left out of the answer" in row.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [(4, "nan"), (5, ""), (15, "x"), (15, "2023-13-01T00:00:00"), (3, ""), (4, "91"), (1, "\xff")],
+)
+def test_a_wrong_line_of_a_list_costs_no_other_line(server: FdsnServer, ask: Ask, field, value):
+    head, *lines = server.fdsn_list().decode().splitlines()
+    cells = next(line for line in lines if "|S002|" in line).split("|")
+    cells[field] = value
+    bad = "|".join(cells).encode("latin-1")
+    server.fail("station", "*", content(b"\n".join([head.encode(), bad, *map(str.encode, lines)])))
+    fetched = ask()
+    assert names(fetched) == STATIONS
+    (row,) = fetched.rejected
+    assert row.kind == "station"
+    assert row.row == (2 if field != 1 else None)
+
+
+def test_a_short_line_of_a_list_costs_no_other_line(server: FdsnServer, ask: Ask):
+    lines = server.fdsn_list().splitlines()
+    server.fail("station", "*", content(b"\n".join([lines[0], lines[1][:20], *lines[1:]])))
+    fetched = ask()
+    assert names(fetched) == STATIONS
+    assert "columns, expected 17" in fetched.rejected[0].reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("1990-01-01T00:00:00|", "1990-01-01T00:00:00|1995-01-01T00:00:00", "of another time"),
+        ("|HN", "|BH", "of another channel"),
+        ("|S0", "|T0", "which the request does not cover"),
+    ],
+)
+def test_a_list_of_nothing_that_was_asked_for_is_a_fault(server, ask: Ask, old, new, problem):
+    wrong = server.fdsn_list().decode().replace(old, new).encode()
+    server.fail("station", "S00?", content(wrong))
+    with pytest.raises(ServiceError, match=problem):
+        ask(stations=("S00?",))
+    assert names(ask(stations=("S00?",))) == STATIONS
 
 
 def test_no_data_is_a_reason_and_is_asked_for_again_on_demand_only(server: FdsnServer, ask: Ask):

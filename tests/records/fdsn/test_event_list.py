@@ -12,8 +12,8 @@ from obspy.core.event import Catalog, Event, Origin
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.records.event_file import read_event
-from per_obspy.records.fdsn.event_list import EventRow, fetched_event, find_events
+from per_obspy.records.event_file import EventRow, read_event
+from per_obspy.records.fdsn.event_list import fetched_event, find_events
 from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
@@ -135,6 +135,69 @@ def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wro
     server.fail("event", "*", content(wrong))
     with pytest.raises(ServiceError, match="data other than a list of events"):
         find_events(server.url, {})
+
+
+HEAD = "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID|MagType"
+GOOD = "good|2019-07-06T03:19:53.04|35.77|-117.599|8.0|ci|ci|ci|x|mw|7.1|ci|Ridgecrest"
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        "bad|2019-07-06T03:19:53|nan|-117.6|8.0|ci|ci|ci|x|mw|7.1|ci|X",
+        "bad|2019-07-06T03:19:53|35.7|-1176|8.0|ci|ci|ci|x|mw|7.1|ci|X",
+        "bad|x|35.7|-117.6|8.0|ci|ci|ci|x|mw|7.1|ci|X",
+        "bad|2019-07-06T03:19:53|35.7|-117.6|8.0|ci|ci|ci|x|mw|inf|ci|X",
+        "bad|2019-07-06T03:19:53|35.7",
+        "bad|2019-07-06T03:19:53|\ufffd5.7|-117.6|8.0|ci|ci|ci|x|mw|7.1|ci|X",
+    ],
+)
+def test_one_wrong_line_of_a_list_costs_no_other(server: FdsnServer, caplog, bad: str):
+    lines = [f"{HEAD}|Magnitude|MagAuthor|EventLocationName", bad, GOOD]
+    server.fail("event", "*", content("\n".join(lines).encode().replace(b"\xef\xbf\xbd", b"\xff")))
+    assert [row.event_id for row in find_events(server.url, {})] == ["good"]
+    assert "left out: bad|" in caplog.text
+
+
+def test_a_line_end_of_unicode_in_a_place_divides_no_line(server: FdsnServer):
+    lines = [f"{HEAD}|Magnitude|MagAuthor|EventLocationName", GOOD.replace("crest", "\x85\u2028")]
+    server.fail("event", "*", content("\r\n".join(lines).encode()))
+    assert [row.magnitude for row in find_events(server.url, {})] == [7.1]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        feature(time=None) | {"id": "bad"},
+        feature() | {"id": "bad", "geometry": None},
+        feature() | {"id": "bad", "geometry": {"coordinates": [None, 35.0]}},
+        feature(mag=71.0) | {"id": "bad"},
+        {"id": "bad"},
+        17,
+    ],
+)
+def test_one_wrong_feature_of_a_feed_costs_no_other(tmp_path: Path, wrong):
+    (tmp_path / "feed.json").write_bytes(feed(wrong, feature()))
+    assert [row.event_id for row in find_events(str(tmp_path / "feed.json"), {})] == ["ci38457511"]
+
+
+def test_one_earthquake_without_longitude_costs_no_other(simulation, tmp_path: Path):
+    placeless = Event(origins=[Origin(time=UTCDateTime(2000, 1, 1), latitude=1.0)])
+    file = str(tmp_path / "events.xml")
+    Catalog([placeless, simulation.event]).write(file, format="QUAKEML")
+    assert [row.magnitude for row in find_events(file, {})] == [6.5]
+
+
+def test_earthquakes_of_another_time_than_asked_for_are_left_out(server: FdsnServer, caplog):
+    lines = [
+        f"{HEAD}|Magnitude|MagAuthor|EventLocationName",
+        GOOD,
+        GOOD.replace("good|2019", "x|2018"),
+    ]
+    server.fail("event", "*", content("\n".join(lines).encode()))
+    query = {"starttime": "2019-07-01", "endtime": "2019-08-01"}
+    assert [row.event_id for row in find_events(server.url, query)] == ["good"]
+    assert "1 earthquakes of another time left out" in caplog.text
 
 
 def test_unknown_sources_are_wrong_input():

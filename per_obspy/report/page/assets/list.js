@@ -272,7 +272,7 @@ function cellText(values, i) {
 
 // A text for a cell: quoted where it must be, and never a formula
 function quoted(value) {
-  const safe = /^[\s]*[=+\-@\t\r]/.test(value) ? `'${value}` : value;
+  const safe = /^[\s]*[=+\-@|\t\r]/.test(value) ? `'${value}` : value;
   return /[",\r\n]/.test(safe) || safe !== value ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
 

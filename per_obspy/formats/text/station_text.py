@@ -1,0 +1,212 @@
+"""
+FDSN station text: one line per channel or station, of which each is right or wrong alone.
+
+References
+----------
+FDSN, "FDSN Web Service Specifications", version 1.2, 2019: columns of the text format of
+fdsnws-station, divided by ``|``.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+from obspy import Inventory, UTCDateTime
+
+from per_obspy.errors import shortened
+
+#: Columns that every line needs, and largest absolute values, degrees.
+_REQUIRED = ("network", "station", "latitude", "longitude")
+_LARGEST = {"latitude": 90.0, "longitude": 180.0}
+
+#: A decimal number; ``float`` also reads ``1_0`` and ``nan``.
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+#: start of an epoch that FDSN station text leaves open
+_OPEN = UTCDateTime(1, 1, 2)
+
+
+class StationLine(NamedTuple):
+    """
+    One channel or station of a list.
+
+    Attributes
+    ----------
+    number : int
+        Of the line; the header is line 1.
+    network, station, location, channel : str
+        Codes; location and channel are empty in a list of stations.
+    latitude, longitude : float
+        Degrees.
+    start, end : UTCDateTime or None
+        Of the epoch; None where it is open.
+    """
+
+    number: int
+    network: str
+    station: str
+    location: str
+    channel: str
+    latitude: float
+    longitude: float
+    start: UTCDateTime | None
+    end: UTCDateTime | None
+
+
+class LineFault(NamedTuple):
+    """
+    A line that cannot be used.
+
+    Attributes
+    ----------
+    number : int
+    name : str
+        Codes in it, as far as they can be read.
+    reason : str
+        Column, value and expectation.
+    """
+
+    number: int
+    name: str
+    reason: str
+
+
+def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
+    r"""
+    Read every line of FDSN station text alone.
+
+    Only codes, place and epoch are read: a fault in another column is none here.
+
+    Parameters
+    ----------
+    content : bytes
+        Answer of a station service to ``format=text``, or a file of it. A byte that is no UTF-8 is
+        a fault only where a code, place or time has it.
+
+    Returns
+    -------
+    lines : list of StationLine
+    faults : list of LineFault
+
+    Raises
+    ------
+    ValueError
+        If the first line does not name the columns.
+
+    Examples
+    --------
+    >>> text = b"#Network|Station|Latitude|Longitude\nXX|A|1.5|2.5\nXX|B|nan|2.5\nXX|C|1"
+    >>> lines, faults = station_lines(text)
+    >>> [line.station for line in lines]
+    ['A']
+    >>> faults[0].reason, faults[1].reason
+    ("latitude: 'nan', expected a number from -90 to 90", 'has 3 columns, expected 4')
+    """
+    # Services write the header with blanks or without
+    first, *rest = _split(content)
+    columns = [name.strip().lower() for name in first.lstrip("\ufeff# ").split("|")]
+    if not set(_REQUIRED) <= set(columns):
+        expected = "#Network|Station|Latitude|Longitude and others"
+        raise ValueError(f"the first line is {shortened(first, 80)!r}, expected {expected}")
+    # Comments and empty lines are none
+    lines, faults = list[StationLine](), list[LineFault]()
+    for number, text in enumerate(rest, 2):
+        if not text.strip() or text.startswith("#"):
+            continue
+        cells = [cell.strip() for cell in text.split("|")]
+        try:
+            lines.append(_line(number, columns, cells))
+        except ValueError as error:
+            name = _codes(columns, cells)
+            faults.append(LineFault(number, name, str(error)))
+    return lines, faults
+
+
+def _codes(columns: Sequence[str], cells: Sequence[str]) -> str:
+    """Return the codes of a wrong line, as far as it has them."""
+    codes = dict(zip(columns, cells, strict=False))
+    names = ("network", "station", "location", "channel")
+    return shortened(".".join(codes[name] for name in names if name in codes), 80)
+
+
+def _split(content: bytes) -> list[str]:
+    """Return the lines of a text; line ends of other alphabets in a site name divide none."""
+    return re.split("\r\n|\r|\n", content.decode("utf-8", "replace"))
+
+
+def _line(number: int, columns: Sequence[str], cells: Sequence[str]) -> StationLine:
+    """Return a line; raise ``ValueError`` with column and value if it is wrong."""
+    if len(cells) < len(columns):
+        raise ValueError(f"has {len(cells)} columns, expected {len(columns)}")
+    # Columns beyond those of the header are nobody's
+    row = dict(zip(columns, cells, strict=False))
+    location, channel = row.get("location", ""), row.get("channel", "")
+    if not row["station"] or ("channel" in columns and not channel):
+        raise ValueError(f"{'channel' if row['station'] else 'station'}: empty, expected a code")
+    return StationLine(
+        number,
+        row["network"],
+        row["station"],
+        "" if location == "--" else location,
+        channel,
+        _degrees(row, "latitude"),
+        _degrees(row, "longitude"),
+        _time(row, "starttime"),
+        _time(row, "endtime"),
+    )
+
+
+def _degrees(row: dict[str, str], name: str) -> float:
+    """Return a coordinate of a line."""
+    # Also refuses what is no number
+    largest = _LARGEST[name]
+    value = float(row[name]) if _NUMBER.fullmatch(row[name]) else math.nan
+    if not abs(value) <= largest:
+        expected = f"a number from {-largest:g} to {largest:g}"
+        raise ValueError(f"{name}: {shortened(row[name], 40)!r}, expected {expected}")
+    return value
+
+
+def _time(row: dict[str, str], name: str) -> UTCDateTime | None:
+    """Return a time of a line; None where it is empty or the line has none."""
+    text = row.get(name, "")
+    if not text:
+        return None
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError as error:
+        expected = "a time such as 2019-07-06T03:19:53"
+        raise ValueError(f"{name}: {shortened(text, 40)!r}, expected {expected}") from error
+    return UTCDateTime(moment.astimezone(UTC) if moment.tzinfo else moment)
+
+
+def marked_open_starts(content: bytes) -> bytes:
+    r"""
+    Return FDSN station text whose empty starts hold a mark, because ObsPy refuses them.
+
+    :func:`with_open_starts` takes the mark away again.
+
+    >>> marked_open_starts(b"#Network|Description|StartTime\nXX|net|")
+    b'#Network|Description|StartTime\nXX|net|0001-01-02T00:00:00.000000Z'
+    """
+    lines = _split(content)
+    header = [field.strip().lower() for field in lines[0].lstrip("#").split("|")]
+    start = header.index("starttime") if "starttime" in header else len(header)
+    # Comments stay as they are
+    for index, line in enumerate(lines[1:], 1):
+        fields = line.split("|")
+        if start < len(fields) and not fields[start].strip() and not line.startswith("#"):
+            lines[index] = "|".join((*fields[:start], str(_OPEN), *fields[start + 1 :]))
+    return "\n".join(lines).encode()
+
+
+def with_open_starts(inventory: Inventory) -> Inventory:
+    """Return an inventory just read without the mark of :func:`marked_open_starts`."""
+    for network in inventory:
+        for station in network:
+            for description in (station, *station.channels):
+                if description.start_date == _OPEN:
+                    description.start_date = None
+    return inventory
