@@ -70,7 +70,7 @@ def read_nsmn(file: WaveformFile, **_unused: Any) -> Stream:
 def _directions(text: Text) -> list[str]:
     """Return the directions of the three columns."""
     directions = line_at(text, _HEADER_LINES - 1, "components").split()
-    if not all(orientation(direction) for direction in directions) or len(directions) != 3:
+    if len(directions) != 3 or not all("sensor_dip" in orientation(name) for name in directions):
         problem = f"expected three directions, got {directions}"
         refuse(text, _HEADER_LINES - 1, "components", problem)
     return directions

@@ -79,7 +79,7 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
     # Words of the header
     words = {"units": unit, "quantity": units[1].lower(), "processing_level": "processed"}
     words |= _title(text) | {"corners": _corners(text)}
-    return Stream([trace(values, dt, words)])
+    return Stream([trace(values, dt, words, text.name)])
 
 
 def _size(text: Text) -> tuple[int, float]:

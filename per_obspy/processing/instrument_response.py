@@ -1,24 +1,25 @@
 """Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
+import re
 from collections.abc import Callable
+from copy import copy, deepcopy
 
 import numpy as np
 from numpy.typing import NDArray
 from obspy import Stream, Trace
 from obspy.core.inventory import Response
-from obspy.core.inventory.response import ResponseStage
+from obspy.core.inventory.response import InstrumentSensitivity, ResponseStage
 from obspy.signal.invsim import cosine_sac_taper
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import GAL, QUANTITIES, RESPONSE_UNITS, SEED_CODE
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.long_records import blocks, forget_plans
-from per_obspy.processing.notes import copied, noted
-
-#: Units of the ground motion in a response.
-ACCELERATION_UNITS = ("M/S**2", "M/S^2", "M/S/S", "M/SEC**2", "M/(S**2)")
-VELOCITY_UNITS = ("M/S", "M/SEC")
+from per_obspy.processing.notes import copied, copied_trace, noted
+from per_obspy.processing.quality.findings import Finding, judged
+from per_obspy.spectra.trace_arguments import unit_after_steps
 
 #: The pre-filter of velocity sensors rises from 0 to 1 in this band, Hz; that of accelerometers
 #: leaves low frequencies unchanged.
@@ -28,9 +29,136 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
 
-
 #: Most seconds of zeros behind a record: the response of the filter is much shorter.
 LONGEST_PAD = 3600.0
+
+#: Samples around the peak that show whether they are whole numbers; their largest distance from
+#: them, least share of them, and fewest steps between them (reasoned).
+AROUND_PEAK, OFF_WHOLE, MOSTLY_WHOLE, FEWEST_STEPS = 5000, 0.05, 0.99, 20
+
+#: Samples that are no whole numbers are none of counts if their peak could be one of ground motion
+#: in any unit (3000 gal), while as counts it would be less than 0.001 m/s2 or m/s (reasoned).
+LARGEST_PHYSICAL, SMALLEST_MOTION = 3000.0, 1e-3
+
+#: Zeros and poles below this are at zero frequency, rad/s or Hz.
+AT_ZERO = 1e-9
+
+#: Factor within which the peak of the header decides between two units of the samples.
+PEAK_FACTOR = 3.0
+
+
+def as_recorded(trace: Trace) -> Trace:
+    """
+    Return a trace in the unit that its samples have, which ObsPy's header may not tell.
+
+    ObsPy removes responses and sensitivities and multiplies by ``calib``, and leaves all of them in
+    the header. ``stats.processing`` names the step; where that is lost, as in a file, the peak of
+    the header decides, or the factor that makes the samples whole numbers of counts.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+        Raw or not, with ``units`` or without.
+
+    Returns
+    -------
+    obspy Trace
+        The same, or a copy with another unit and without the response.
+
+    Raises
+    ------
+    RecordRejected
+        If the samples are no counts, and their unit is unknown.
+    """
+    unit, reason = unit_after_steps(trace.stats), "steps of ObsPy"
+    if unit in (None, "counts"):
+        unit, reason = _unit_by_samples(trace)
+    if unit in (None, trace.stats.get("units", "counts")):
+        return trace
+    out = copied_trace(trace)
+    # Response, factor and peak describe counts, which these samples are not
+    out.stats.pop("response", None)
+    if trace.stats.get("units", "counts") == "counts":
+        out.stats.pop("header_peak", None)
+    out.stats.calib, out.stats.units = 1.0, unit
+    if unit in QUANTITIES:
+        out.stats.quantity = QUANTITIES[unit]
+    noted(out, f"in {unit} already, by {reason}", conversion=reason)
+    return out
+
+
+def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
+    """Return the unit of samples that should be counts, None if they are, and what shows it."""
+    samples = np.ma.getdata(trace.data)
+    units = _physical_units(trace)
+    is_whole = np.issubdtype(samples.dtype, np.integer) or _are_whole(samples, 1.0)
+    if not units or is_whole or not samples.size:
+        return None, ""
+    peaks = np.abs(samples).max(), np.abs(samples - samples.mean()).max()
+    peak_in_counts = _header_peak(trace)
+    for reason, (unit, factor) in units.items():
+        expected = {unit: peak_in_counts * factor, None: peak_in_counts}
+        error = {
+            name: min(abs(np.log(peak / value)) for peak in peaks)
+            for name, value in expected.items()
+            if value > 0 and min(peaks) > 0
+        }
+        nearest = min(error, key=error.__getitem__, default=None)
+        if error and error[nearest] < np.log(PEAK_FACTOR):
+            return nearest, f"{reason}, as the header's peak shows"
+        if _are_whole(samples, 1 / factor):
+            return unit, f"{reason}, which makes them whole numbers"
+        if peaks[0] < LARGEST_PHYSICAL and peaks[1] * factor < SMALLEST_MOTION:
+            raise RecordRejected(
+                trace.id,
+                f"samples: no whole numbers up to {peaks[0]:.4g}, which would be "
+                f"{peaks[1] * factor:.2g} {unit} if they were counts: they seem to be "
+                f"physical already; needs counts, or stats.units",
+            )
+    return None, ""
+
+
+def _physical_units(trace: Trace) -> dict[str, tuple[str, float]]:
+    """Return what may have been applied to counts -> unit of the result, and unit per count."""
+    stats = trace.stats
+    units = {}
+    # ObsPy's K-NET reader gives m/s2 without naming the quantity
+    if stats.calib not in (0.0, 1.0):
+        is_acceleration = stats.get("quantity") == "acceleration" or "knet" in stats
+        unit = "m/s2" if is_acceleration else "counts times calib"
+        units["apply_calib"] = (unit, abs(float(stats.calib)))
+    sensitivity = getattr(stats.get("response"), "instrument_sensitivity", None)
+    unit = RESPONSE_UNITS.get(str(getattr(sensitivity, "input_units", None)).upper(), "")
+    if unit and sensitivity.value:
+        units["remove_sensitivity"] = (unit, 1 / abs(float(sensitivity.value)))
+    return units
+
+
+def _header_peak(trace: Trace) -> float:
+    """Return the peak of the header, counts; 0 if there is none."""
+    if "header_peak" in trace.stats:
+        return float(trace.stats.header_peak or 0.0)
+    peak = trace.stats.get("knet", {}).get("accmax") or 0.0
+    return float(peak) * GAL / trace.stats.calib if trace.stats.calib else 0.0
+
+
+def _are_whole(samples: FloatArray, factor: float) -> bool:
+    """
+    Return whether samples times a factor are whole numbers but for their mean and a line.
+
+    Second differences are free of both. They must not be zeros alone. Samples that are not finite,
+    which are rejected elsewhere, count as whole.
+    """
+    first = max(int(np.abs(samples).argmax()) - AROUND_PEAK, 0)
+    part = samples[first : first + 2 * AROUND_PEAK].astype(np.float64) * factor
+    if not np.isfinite(part).all():
+        return True
+    if np.array_equal(part, np.round(part)):
+        return bool(part.any()) or factor == 1.0
+    bends = np.diff(part, 2)
+    nearest = np.round(bends)
+    is_near = np.abs(bends - nearest) < OFF_WHOLE
+    return bool(np.count_nonzero(nearest) >= FEWEST_STEPS and is_near.mean() >= MOSTLY_WHOLE)
 
 
 def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
@@ -66,24 +194,30 @@ def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
     out = copied(stream)
     for trace in out:
         units = trace.stats.get("units", "counts")
-        if units not in ("m/s2", "counts"):
-            raise RecordRejected(trace.id, f"units {units!r}, needs m/s2 or counts with a response")
         if units == "counts":
             _convert(trace, gain_tolerance)
+        elif units != "m/s2":
+            problem = f"units {units!r}, needs m/s2 or counts with a response"
+            if units == "m/s":
+                problem += "; remove_response with output='ACC', or differentiate"
+            raise RecordRejected(trace.id, problem)
     return out
 
 
 def _convert(trace: Trace, tolerance: float) -> None:
     """Convert the copy of a step from counts to m/s2."""
     response = trace.stats.get("response")
+    if response is not None:
+        response = with_overall_sensitivity(response)
     if response is None or response.instrument_sensitivity is None:
         _multiply_calibration(trace)
     else:
-        is_accelerometer = _is_accelerometer(trace, response)
         _require_consistent(trace, response, tolerance)
+        unit, response = _response_of_sensor(trace, response)
         if any(type(stage) is not ResponseStage for stage in response.response_stages):
-            _deconvolve(trace, ACCELERATION_BAND if is_accelerometer else VELOCITY_BAND)
-        elif is_accelerometer:
+            band = ACCELERATION_BAND if unit == "m/s2" else VELOCITY_BAND
+            _deconvolve(trace, response, band)
+        elif unit == "m/s2":
             _divide_sensitivity(trace, response)
         else:
             raise RecordRejected(
@@ -95,6 +229,59 @@ def _convert(trace: Trace, tolerance: float) -> None:
     trace.stats.units, trace.stats.quantity = "m/s2", "acceleration"
 
 
+def with_overall_sensitivity(response: Response) -> Response:
+    """
+    Return a response with an overall sensitivity, which is optional in StationXML.
+
+    It is the product of the gains of the stages, as in ObsPy. Unchanged where it is there already,
+    or where no stage has a gain.
+    """
+    stages = response.response_stages
+    gains = [stage.stage_gain for stage in stages if stage.stage_gain is not None]
+    if response.instrument_sensitivity is not None or not gains:
+        return response
+    out = copy(response)
+    out.instrument_sensitivity = InstrumentSensitivity(
+        float(np.prod(gains)),
+        stages[0].stage_gain_frequency or 0.0,
+        stages[0].input_units,
+        stages[-1].output_units,
+    )
+    return out
+
+
+def _response_of_sensor(trace: Trace, response: Response) -> tuple[str, Response]:
+    """
+    Return the unit of ground motion of a response, and the response with that unit.
+
+    Instrument code N is an accelerometer. Where StationXML names M/S for it and its poles and zeros
+    pass a constant motion, the name is wrong: a sensor of velocity has no such response, as it
+    needs moving ground. Its record is then converted as acceleration, with a warning.
+    """
+    name = str(response.instrument_sensitivity.input_units)
+    unit = RESPONSE_UNITS.get(name.upper(), "")
+    if unit not in ("m/s2", "m/s"):
+        raise RecordRejected(trace.id, f"response from {name!r}, needs M/S**2 or M/S")
+    channel = trace.stats.channel.upper()
+    if unit == "m/s2" or not (re.fullmatch(SEED_CODE, channel) and channel[1] == "N"):
+        return unit, response
+    sensor = next((one for one in response.response_stages if hasattr(one, "zeros")), None)
+    if sensor is None or any(abs(zero) < AT_ZERO for zero in sensor.zeros):
+        _warned(trace, f"response from {name!r}, but instrument code N is an accelerometer")
+        return unit, response
+    text = f"response from {name!r}, but an accelerometer (code N) flat to zero frequency"
+    _warned(trace, f"{text}: taken as M/S**2")
+    out = deepcopy(response)
+    out.instrument_sensitivity.input_units = out.response_stages[0].input_units = "M/S**2"
+    return "m/s2", out
+
+
+def _warned(trace: Trace, reason: str) -> None:
+    """Add a warning to the copy of a step."""
+    [judged_trace] = judged(trace, [Finding("response_units", "warn", reason)])
+    trace.stats.per_obspy = judged_trace.stats.per_obspy
+
+
 def _multiply_calibration(trace: Trace) -> None:
     """Multiply by the reader's factor, if it is one to acceleration."""
     # ObsPy's K-NET reader gives m/s2 without naming the quantity
@@ -103,14 +290,6 @@ def _multiply_calibration(trace: Trace) -> None:
         raise RecordRejected(trace.id, "counts without a response or a calibration factor")
     trace.data = trace.data * trace.stats.calib
     noted(trace, f"multiplied by calib {trace.stats.calib:g} m/s2", conversion="calibration factor")
-
-
-def _is_accelerometer(trace: Trace, response: Response) -> bool:
-    """Return whether a response is one to acceleration; reject other units than velocity."""
-    units = str(response.instrument_sensitivity.input_units).upper()
-    if units not in ACCELERATION_UNITS + VELOCITY_UNITS:
-        raise RecordRejected(trace.id, f"response from {units!r}, needs M/S**2 or M/S")
-    return units in ACCELERATION_UNITS
 
 
 def _require_consistent(trace: Trace, response: Response, tolerance: float) -> None:
@@ -134,7 +313,7 @@ def _divide_sensitivity(trace: Trace, response: Response) -> None:
     noted(trace, f"divided by sensitivity {sensitivity:g} counts/(m/s2)", conversion="sensitivity")
 
 
-def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
+def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> None:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
     band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up samples that the filter moves around
@@ -142,7 +321,7 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
     step = 1 / (length * dt)
     try:
-        response_at = _interpolated(trace.stats.response, step, length // 2 * step)
+        response_at = _interpolated(response, step, length // 2 * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
     # Taper and response of a day would take more memory than the record: block by block

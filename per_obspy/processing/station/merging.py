@@ -2,17 +2,28 @@
 
 from collections import defaultdict
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.notes import copied, copied_trace, is_processed, taken
+from per_obspy.processing.instrument_response import as_recorded
+from per_obspy.processing.notes import copied_trace, is_processed, taken
 from per_obspy.processing.quality.findings import surviving
+from per_obspy.processing.station.components import SAMPLING_TOLERANCE
 from per_obspy.processing.station.splicing import spliced
 
 #: Largest sample, counts or m/s2: squares of larger ones overflow, and no recorder writes them.
 LARGEST = 1e30
+
+#: Most samples that may be missing between pieces, reasoned: two days at 100 Hz. A wrong date must
+#: not take the memory of years.
+MOST_MISSING = 2**24
+
+#: Difference of coordinates of one place, degrees.
+SAME_PLACE = 0.01
 
 
 def merged(stream: Iterable[Trace]) -> tuple[Stream, tuple[Rejection, ...]]:
@@ -42,39 +53,42 @@ def merged(stream: Iterable[Trace]) -> tuple[Stream, tuple[Rejection, ...]]:
     return surviving(joined, taken(firsts))
 
 
-def _pieces(stream: Iterable[Trace]) -> dict[tuple[str, bool, str], Stream]:
+def _pieces(stream: Iterable[Trace]) -> dict[tuple[str, bool, str, str], Stream]:
     """Return the pieces of each channel."""
-    pieces: dict[tuple[str, bool, str], Stream] = defaultdict(Stream)
+    pieces: dict[tuple[str, bool, str, str], Stream] = defaultdict(Stream)
     for trace in stream:
         pieces[_channel(trace)] += trace
     return pieces
 
 
-def _channel(trace: Trace) -> tuple[str, bool, str]:
-    """Return the key of the pieces of one channel; its velocity and displacement are others."""
+def _channel(trace: Trace) -> tuple[str, bool, str, str]:
+    """
+    Return the key of the pieces of one channel.
+
+    Its velocity and displacement are others, and so are directions that the reader does not know.
+    """
     units = str(trace.stats.get("units", ""))
-    return trace.id, is_processed(trace), units if units in ("m/s", "m") else ""
+    direction = str(trace.stats.get("direction", ""))
+    return trace.id, is_processed(trace), units if units in ("m/s", "m") else "", direction
 
 
 def _joined(name: str, pieces: Stream) -> Stream:
     """Return the pieces of one channel as one trace."""
-    copies = Stream([_in_float64(piece) for piece in pieces if piece.stats.npts])
-    reasons = [f"pieces differ in {field}: {values}" for field, values in _differences(copies)]
-    if not copies:
-        reasons = ["no samples"]
+    copies = Stream([_in_float64(as_recorded(piece)) for piece in pieces if piece.stats.npts])
+    reasons = _differences(copies) if copies else ["no samples"]
     if reasons:
         raise RecordRejected(name, *reasons)
-    # Samples that overlap and disagree are masked
-    whole = copied(copies).merge(method=0)
-    reasons = _holes(whole[0])
+    # All pieces are compared before any is joined
+    whole, contradicts = _overlaid(copies)
+    reasons = _holes(whole, contradicts)
     # Overlapping pieces may still agree at other times than their clocks have
     if reasons:
         joined = None if _has_gaps(copies) else spliced(copies)
         if joined is None or len(copies) == 1:
             raise RecordRejected(name, *reasons)
-        whole = Stream([joined])
-    whole[0].data = np.ascontiguousarray(np.ma.getdata(whole[0].data))
-    return whole
+        whole = joined
+    whole.data = np.ascontiguousarray(np.ma.getdata(whole.data))
+    return Stream([whole])
 
 
 def _in_float64(trace: Trace) -> Trace:
@@ -84,27 +98,80 @@ def _in_float64(trace: Trace) -> Trace:
     return out
 
 
+def _overlaid(pieces: Stream) -> tuple[Trace, NDArray[np.bool_]]:
+    """
+    Return all pieces on the samples of the first one, masked where none has any, and the conflicts.
+
+    Clocks that differ by a fraction of a sample follow the first piece. A sample is in conflict
+    where any two pieces differ.
+    """
+    ordered = sorted(pieces, key=lambda piece: piece.stats.starttime)
+    if len(ordered) == 1:
+        return ordered[0], np.zeros(ordered[0].stats.npts, dtype=bool)
+    # The interval of the longest piece, by which its last sample is in its place
+    out = copied_trace(ordered[0])
+    longest = max(ordered, key=lambda piece: piece.stats.npts)
+    start, dt = out.stats.starttime, longest.stats.delta
+    places = [round((piece.stats.starttime - start) / dt) for piece in ordered]
+    ends = [place + piece.stats.npts for place, piece in zip(places, ordered, strict=True)]
+    count = max(ends)
+    if count > MOST_MISSING + sum(piece.stats.npts for piece in ordered):
+        raise RecordRejected(out.id, f"pieces are up to {count * dt:g} s apart")
+    samples, is_filled, contradicts = np.zeros(count), *np.zeros((2, count), dtype=bool)
+    for place, end, piece in zip(places, ends, ordered, strict=True):
+        part, is_present = np.ma.getdata(piece.data), ~np.ma.getmaskarray(piece.data)
+        before = slice(place, end)
+        contradicts[before] |= is_present & is_filled[before] & (samples[before] != part)
+        samples[before] = np.where(is_present, part, samples[before])
+        is_filled[before] |= is_present
+    out.data = samples if is_filled.all() else np.ma.masked_array(samples, ~is_filled)
+    out.stats.delta = dt
+    return out, contradicts
+
+
 def _has_gaps(pieces: Stream) -> bool:
     """Return whether time is missing between pieces; overlaps are negative gaps."""
     return any(seconds > 0 for *_, seconds, _ in pieces.get_gaps())
 
 
-def _differences(pieces: Iterable[Trace]) -> list[tuple[str, str]]:
-    """Return name and values of each property in which the pieces of a channel differ."""
-    found = []
-    for field in ("sampling_rate", "calib", "units"):
-        values = {piece.stats.get(field) for piece in pieces}
-        if len(values) > 1:
-            found.append((field, ", ".join(sorted(map(str, values)))))
-    return found
+def _differences(pieces: Stream) -> list[str]:
+    """Return the properties in which the pieces of a channel differ, with their values."""
+    places = [piece.stats.get("coordinates") or {} for piece in pieces]
+    values: dict[str, list[Any]] = {
+        "sampling_rate": [piece.stats.sampling_rate for piece in pieces],
+        "calib": [piece.stats.calib for piece in pieces],
+        "sensitivity": [_sensitivity(piece) for piece in pieces],
+        "latitude": [place.get("latitude") for place in places],
+        "longitude": [place.get("longitude") for place in places],
+        "units": [piece.stats.get("units", "counts") for piece in pieces],
+    }
+    # Rounding is no difference, neither are two descriptions of one place
+    reasons = []
+    for field, of_pieces in values.items():
+        texts = sorted({str(value) for value in of_pieces if value is not None})
+        numbers = [float(value) for value in of_pieces if isinstance(value, int | float)]
+        margin = SAME_PLACE if field in ("latitude", "longitude") else 0.0
+        if len(texts) > 1 and not np.allclose(
+            numbers or np.nan, numbers[:1] or np.nan, SAMPLING_TOLERANCE, margin
+        ):
+            reasons.append(f"pieces differ in {field}: {', '.join(texts)}")
+    return reasons
 
 
-def _holes(trace: Trace) -> list[str]:
+def _sensitivity(trace: Trace) -> float | None:
+    """Return the overall sensitivity of the response, None where there is none."""
+    response = trace.stats.get("response")
+    sensitivity = response.instrument_sensitivity if response else None
+    return sensitivity.value if sensitivity else None
+
+
+def _holes(trace: Trace, contradicts: NDArray[np.bool_]) -> list[str]:
     """Return the reasons for missing and unusable samples, with their number and first time."""
     is_missing = np.ma.getmaskarray(trace.data)
     is_wrong = ~(np.abs(np.ma.getdata(trace.data)) < LARGEST) & ~is_missing
     faults = {
-        "samples are missing (gap or contradicting overlap)": is_missing,
+        "samples are missing (a gap)": is_missing,
+        "samples contradict each other in overlapping pieces": contradicts,
         f"samples are not finite or beyond {LARGEST:g}": is_wrong,
     }
     # Number and first time of the samples of each fault
