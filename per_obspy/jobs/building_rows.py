@@ -23,6 +23,7 @@ from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
 from per_obspy.screening.building_rows.members import IntArray
 from per_obspy.screening.values import Columns, chosen, components
+from per_obspy.spectra.station import lacks_azimuths
 from per_obspy.tables.building_rows import write_rows_part
 
 #: Contacts of a chunk, about: a worker needs 1 kB for each.
@@ -127,6 +128,11 @@ def do_rows(job: RowsJob) -> RowsPart:
     if job.station is None:
         return _recorded(job, contacts, no_outcomes(job.contacts.num_rows), ())
     dataset = read_station_once(job.station.shard, job.station.hash)
+    if lacks_azimuths(dataset):
+        reason = f"the azimuths of the horizontals of {dataset['station'].item()} are unknown"
+        names = dict.fromkeys(contacts["row_id"].tolist())
+        rejected = [Rejection("row", name, "", None, (reason,)) for name in names]
+        return _recorded(job, contacts, no_outcomes(job.contacts.num_rows), rejected)
     # Along a single horizontal whatever the axis: it counts as north
     one_horizontal = dataset.sizes["horizontal"] == 1
     if one_horizontal:
