@@ -36,15 +36,16 @@ LONGEST_PAD = 3600.0
 #: them, least share of them, and fewest steps between them (reasoned).
 AROUND_PEAK, OFF_WHOLE, MOSTLY_WHOLE, FEWEST_STEPS = 5000, 0.05, 0.99, 20
 
-#: Samples that are no whole numbers are none of counts if their peak could be one of ground motion
-#: in any unit (3000 gal), while as counts it would be less than 0.001 m/s2 or m/s (reasoned).
-LARGEST_PHYSICAL, SMALLEST_MOTION = 3000.0, 1e-3
+#: Samples that are no whole numbers may be ground motion up to 100 m/s2 or m/s. Up to 3000 (gal)
+#: they are no counts where these would be less than 0.02 m/s2 or m/s, with more than 100 of them to
+#: a unit: a filtered record of weak motion is refused as well (reasoned).
+LARGEST_MOTION, LARGEST_NUMBER, SMALLEST_MOTION, FEWEST_COUNTS = 100.0, 3000.0, 0.02, 100.0
 
 #: Zeros and poles below this are at zero frequency, rad/s or Hz.
 AT_ZERO = 1e-9
 
-#: Factor within which the peak of the header decides between two units of the samples.
-PEAK_FACTOR = 3.0
+#: Logarithm of the factor within which the peak of the header decides between units of the samples.
+PEAK_FACTOR = np.log(3.0)
 
 
 def as_recorded(trace: Trace) -> Trace:
@@ -71,6 +72,8 @@ def as_recorded(trace: Trace) -> Trace:
         If the samples are no counts, and their unit is unknown.
     """
     unit, reason = unit_after_steps(trace.stats), "steps of ObsPy"
+    if unit is not None and unit.startswith("unknown"):
+        raise RecordRejected(trace.id, f"units {unit}, needs m/s2 or counts with a response")
     if unit in (None, "counts"):
         unit, reason = _unit_by_samples(trace)
     if unit in (None, trace.stats.get("units", "counts")):
@@ -91,29 +94,29 @@ def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
     """Return the unit of samples that should be counts, None if they are, and what shows it."""
     samples = np.ma.getdata(trace.data)
     units = _physical_units(trace)
-    is_whole = np.issubdtype(samples.dtype, np.integer) or _are_whole(samples, 1.0)
-    if not units or is_whole or not samples.size:
+    if not units or not samples.size or _are_whole(samples, 1.0):
         return None, ""
-    peaks = np.abs(samples).max(), np.abs(samples - samples.mean()).max()
-    peak_in_counts = _header_peak(trace)
-    for reason, (unit, factor) in units.items():
-        expected = {unit: peak_in_counts * factor, None: peak_in_counts}
-        error = {
-            name: min(abs(np.log(peak / value)) for peak in peaks)
-            for name, value in expected.items()
-            if value > 0 and min(peaks) > 0
-        }
-        nearest = min(error, key=error.__getitem__, default=None)
-        if error and error[nearest] < np.log(PEAK_FACTOR):
-            return nearest, f"{reason}, as the header's peak shows"
-        if _are_whole(samples, 1 / factor):
-            return unit, f"{reason}, which makes them whole numbers"
-        if peaks[0] < LARGEST_PHYSICAL and peaks[1] * factor < SMALLEST_MOTION:
+    largest = max(np.abs(samples).max(), np.finfo(float).tiny)
+    peak = max(np.abs(samples - samples.mean()).max(), np.finfo(float).tiny)
+    header_peak = _header_peak(trace)
+    for step, (unit, factor) in units.items():
+        # The peak of the header is that of counts or of motion; a part of the record has less
+        is_counts, is_motion = (
+            header_peak and min(abs(np.log(largest / size)), abs(np.log(peak / size))) < PEAK_FACTOR
+            for size in (header_peak or 1.0, header_peak * factor or 1.0)
+        )
+        if is_counts or is_motion:
+            return unit if is_motion else None, f"{step}, as the header's peak shows"
+        most = np.exp(PEAK_FACTOR) * header_peak * factor or LARGEST_MOTION
+        if peak < most and _are_whole(samples, 1 / factor):
+            return unit, f"{step}, without which they are whole numbers"
+        motion = peak * factor
+        if largest < LARGEST_NUMBER and motion < SMALLEST_MOTION and factor < 1 / FEWEST_COUNTS:
             raise RecordRejected(
                 trace.id,
-                f"samples: no whole numbers up to {peaks[0]:.4g}, which would be "
-                f"{peaks[1] * factor:.2g} {unit} if they were counts: they seem to be "
-                f"physical already; needs counts, or stats.units",
+                f"samples: no whole numbers up to {largest:.4g}, as counts no more than "
+                f"{motion:.2g} {unit}: they seem to be physical already; needs counts, or "
+                f"stats.units",
             )
     return None, ""
 
@@ -150,6 +153,8 @@ def _are_whole(samples: FloatArray, factor: float) -> bool:
     which are rejected elsewhere, count as whole.
     """
     first = max(int(np.abs(samples).argmax()) - AROUND_PEAK, 0)
+    if np.issubdtype(samples.dtype, np.integer) and factor == 1.0:
+        return True
     part = samples[first : first + 2 * AROUND_PEAK].astype(np.float64) * factor
     if not np.isfinite(part).all():
         return True

@@ -49,6 +49,9 @@ def _spliced_pair(first: Trace | None, second: Trace) -> Trace | None:
     # Overlap by the samples, and by the clocks
     dt = first.stats.delta
     by_clocks = (first.stats.endtime - second.stats.starttime) / dt + 1
+    # By their clocks one covers the other: they are copies, not parts
+    if by_clocks >= min(first.stats.npts, second.stats.npts):
+        return None
     shortest = max(round(SHORTEST_OVERLAP / dt), math.ceil(by_clocks - LARGEST_SHIFT / dt))
     longest = min(round(LONGEST_OVERLAP / dt), math.floor(by_clocks + LARGEST_SHIFT / dt))
     count, agreement = best_overlap(first.data, second.data, shortest, longest)
