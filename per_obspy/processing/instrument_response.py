@@ -132,7 +132,7 @@ def _physical_units(trace: Trace) -> dict[str, tuple[str, float]]:
         units["apply_calib"] = (unit, abs(float(stats.calib)))
     sensitivity = getattr(stats.get("response"), "instrument_sensitivity", None)
     unit = RESPONSE_UNITS.get(str(getattr(sensitivity, "input_units", None)).upper(), "")
-    if unit and sensitivity.value:
+    if sensitivity and unit and sensitivity.value:
         units["remove_sensitivity"] = (unit, 1 / abs(float(sensitivity.value)))
     return units
 
@@ -249,7 +249,7 @@ def with_overall_sensitivity(response: Response) -> Response:
     out.instrument_sensitivity = InstrumentSensitivity(
         float(np.prod(gains)),
         stages[0].stage_gain_frequency or 0.0,
-        stages[0].input_units,
+        next((stage.input_units for stage in stages if stage.input_units), None),
         stages[-1].output_units,
     )
     return out

@@ -11,7 +11,13 @@ from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.formats.text.lines import LONGEST_NUMBER
-from per_obspy.formats.text.vocabulary import channel_direction, coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import (
+    channel_direction,
+    coordinates,
+    horizontal,
+    is_direction,
+    trace,
+)
 
 #: unit of a table -> m/s2
 TABLE_UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
@@ -168,7 +174,7 @@ def _directions(
     # An azimuth comes before the code
     directions = {code: channel_direction(code) for code in channels}
     directions |= {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
-    if unclear := [code for code, known in directions.items() if "sensor_dip" not in known]:
+    if unclear := [code for code, known in directions.items() if not is_direction(known)]:
         raise ValueError(
             f"azimuths must contain the direction of {unclear}: expected codes of SEED that end in "
             f"N, E or Z, or words as NS, UP, L, TRAN"

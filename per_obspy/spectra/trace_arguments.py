@@ -199,7 +199,7 @@ def unit_after_steps(stats: Any) -> str | None:
             order = None
         if order is None or not 0 <= order < len(_UNITS):
             return f"unknown after {step}"
-    return _UNITS[order]
+    return None if order is None else _UNITS[order]
 
 
 def _removed_to(step: str, line: str, stats: Any) -> int | None:

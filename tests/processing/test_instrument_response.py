@@ -287,7 +287,7 @@ def test_a_calibration_that_is_applied_is_not_applied_again(with_response):
     assert_allclose(motion_of(half), half[0].data, rtol=1e-12)
     # gal, by the header's peak
     applied[0].data = 100 * applied[0].data
-    with pytest.raises(RecordRejected, match="needs counts, or stats.units"):
+    with pytest.raises(RecordRejected, match=r"needs counts, or stats\.units"):
         motion_of(applied)
 
 

@@ -76,7 +76,10 @@ _DEGREES = re.compile(r"\d{1,3}(\.\d*)?")
 _NUMBERS = ("1", "2", "3")
 _HORIZONTAL_CODES = tuple("NE12LTRHXY")
 _FILE_AZIMUTH = re.compile(r"000|0[1-9]\d|[12]\d\d|3[0-5]\d|360")
+_FILE_NUMBER = re.compile(r"(H|HOR|[A-Z][GHLMN])[12]")
 _FILE_CODES = tuple("NEZ12")
+#: words before a direction
+_COMPONENT = re.compile(r"COMP(ONENT)?\b[\s.:]*+")
 
 #: smallest sampling rate, Hz -> band code of SEED
 _BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
@@ -89,9 +92,9 @@ def orientation(words: str) -> dict[str, Any]:
     """
     Return ``sensor_azimuth``, ``sensor_dip``, ``direction`` of ``N21E``, ``NS``, ``UP``, ``LONG``.
 
-    A word without an azimuth is the ``direction``; an unknown one has no dip either, as it may be
-    that of the vertical. No word gives an empty mapping. A single 1, 2 or 3 is a number, not an
-    azimuth.
+    A word without an azimuth is the ``direction``; an unknown or numbered one has no dip either, as
+    it may be that of the vertical. No word gives an empty mapping. A single 1, 2 or 3 is a number,
+    not an azimuth.
 
     >>> orientation("S 16 E"), orientation("270 DEG")
     ({'sensor_azimuth': 164.0, 'sensor_dip': 0.0}, {'sensor_azimuth': 270.0, 'sensor_dip': 0.0})
@@ -100,7 +103,7 @@ def orientation(words: str) -> dict[str, Any]:
     >>> orientation("Tran"), orientation("Othr")
     ({'direction': 'TRAN', 'sensor_dip': 0.0}, {'direction': 'OTHR'})
     """
-    text = words.strip().upper()
+    text = _COMPONENT.sub("", words.strip().upper())
     word = text.removesuffix("DEG").rstrip(" .")
     # Vertical sensors and points of the compass
     if word in VERTICAL_DIPS:
@@ -124,15 +127,22 @@ def _without_azimuth(word: str) -> dict[str, Any]:
     letter = _letter(word)
     if letter == "Z":
         return {"sensor_dip": -90.0}
-    # U, V and W may be three inclined sensors, 3 and A, B, C any direction
-    is_horizontal = word in HORIZONTAL_LETTERS or letter in _HORIZONTAL_CODES
+    # U, V and W may be three inclined sensors; 1, 2, 3 and A, B, C any direction
+    is_numbered = letter in _NUMBERS and (word in _NUMBERS or word not in HORIZONTAL_LETTERS)
+    is_horizontal = not is_numbered and letter in _HORIZONTAL_CODES
     return {"direction": word} | ({"sensor_dip": 0.0} if is_horizontal else {})
+
+
+def is_direction(words: Mapping[str, Any]) -> bool:
+    """Return whether an orientation is a vertical, or a horizontal such as HN1 and HN2."""
+    return "sensor_dip" in words or _letter(str(words.get("direction", ""))) in ("1", "2")
 
 
 def _letter(word: str) -> str:
     """Return the last letter of a channel code for a word without an azimuth; empty if unknown."""
-    if word in HORIZONTAL_LETTERS:
-        return HORIZONTAL_LETTERS[word]
+    known = word if word in HORIZONTAL_LETTERS else word.rstrip("0123456789")
+    if known in HORIZONTAL_LETTERS:
+        return HORIZONTAL_LETTERS[known]
     return word[-1] if re.fullmatch(SEED_CODE, word) or word in _NUMBERS else ""
 
 
@@ -164,9 +174,10 @@ def file_direction(name: str) -> dict[str, Any]:
     stem, _, suffix = re.split(r"[/\\]", name)[-1].upper().rpartition(".")
     words = [suffix if len(suffix) > 1 else "", *re.split(r"[-_. ]+", stem)[-1:]]
     for word in words:
-        is_number = word.isdigit() and (word == stem or not _FILE_AZIMUTH.fullmatch(word))
-        direction = {} if is_number else orientation(word)
-        if "sensor_dip" in direction:
+        is_azimuth = word != stem and _FILE_AZIMUTH.fullmatch(word)
+        is_numbered = word[-1:].isdigit() and not (is_azimuth or _FILE_NUMBER.fullmatch(word))
+        direction = {} if is_numbered else orientation(word)
+        if is_direction(direction):
             return direction
     code = re.search(rf"{SEED_CODE}$", stem)
     return orientation(code[0]) if code and code[0][-1] in _FILE_CODES else {}

@@ -95,18 +95,19 @@ def told_apart(instrument: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     components : obspy Stream
     rejected : tuple of Rejection
     """
-    codes = {direction_of(trace.stats.channel) for trace in instrument}
+    # Words of the header where it has any
+    words = [str(trace.stats.get("direction", trace.stats.channel)) for trace in instrument]
+    codes = set(map(direction_of, words))
     unclear = {"1", "2", "3"} if codes & {"0", "3"} else set[str]()
     unclear |= {"U", "V"} if any(len(code) == 3 and code.endswith("W") for code in codes) else set()
     dips = [_dip(trace, unclear) for trace in instrument]
     has_vertical = any(dip is not None and abs(dip) >= VERTICAL_DIP for dip in dips)
-    # Words of the header where it has any
-    words = [str(trace.stats.get("direction", trace.stats.channel)) for trace in instrument]
     counts = Counter(trace.id for trace in instrument)
     apart, rejected = Stream(), []
     for trace, word, dip in zip(instrument, words, dips, strict=True):
         if counts[trace.id] > 1:
-            names = ", ".join(sorted(map(repr, words)))
+            same = zip(words, instrument, strict=True)
+            names = ", ".join(sorted(repr(name) for name, other in same if other.id == trace.id))
             rejected.append(rejection(trace, f"directions {names} cannot be told apart"))
         elif dip is None and not has_vertical and len(instrument) > 1:
             reason = f"direction {word!r} is unknown and no component is vertical: it may be that"
@@ -121,11 +122,11 @@ def _dip(trace: Trace, unclear: set[str]) -> float | None:
     stats = trace.stats
     if "sensor_dip" in stats:
         return float(stats.sensor_dip)
-    direction = direction_of(stats.channel)
+    # Where the header has a word, the letter of the channel may be a number
+    direction = direction_of(str(stats.get("direction", stats.channel)))
     if "sensor_azimuth" in stats or direction in COMPASS_AZIMUTHS:
         return 0.0
-    # The reader of a header with another word knows no more than its number
-    if "direction" in stats or direction in unclear:
+    if direction in unclear:
         return None
     is_horizontal = direction in HORIZONTAL_LETTERS or AZIMUTH_CODE.fullmatch(direction)
     return VERTICAL_DIPS.get(direction, 0.0 if is_horizontal else None)
@@ -155,7 +156,9 @@ def instruments(stream: Stream) -> list[Stream]:
 def _family(channel: str) -> str:
     """Return band and instrument of a SEED code, or the number at the end of EW1, NS2, UD2."""
     code = channel.upper()
-    if re.fullmatch(SEED_CODE, code):
+    words = {*COMPASS_AZIMUTHS, *VERTICAL_DIPS, *HORIZONTAL_LETTERS}
+    # Readers leave out the letter of an unknown direction
+    if re.fullmatch(SEED_CODE, code) or (code not in words and re.fullmatch(SEED_CODE, f"{code}Z")):
         return code[:2]
     # H1 and H2, or 1 and 2, are components, and 090 is an azimuth
     letters = code.rstrip("0123456789")

@@ -81,7 +81,8 @@ def test_no_word_is_no_direction(words: str):
     [
         *[(words, "L") for words in ("L", "Long", "LONGITUDINAL", "HNL")],
         *[(words, "T") for words in ("T", "Tran", "TRANSVERSE", "HGT")],
-        *[(words, "1") for words in ("H1", "Hor 1", "1", "HN1", "BH1", "FN")],
+        *[(words, "L") for words in ("Comp. L", "L1")],
+        *[(words, "1") for words in ("H1", "Hor 1", "FN")],
         *[("Radial", "R"), ("HNE", "E"), ("HLN", "N"), ("X", "X"), ("Y", "Y")],
     ],
 )
@@ -93,10 +94,18 @@ def test_horizontals_without_an_azimuth_keep_their_word(words: str, letter: str)
     assert channel_code(100, direction) == f"HN{letter}"
 
 
-@pytest.mark.parametrize("words", ["361", "N100E", "N E", "Other", "9999", "-20", "HN3", "HNA"])
-def test_unknown_directions_have_no_dip(words: str):
-    # each may be the vertical
-    assert set(orientation(words)) == {"direction"}
+@pytest.mark.parametrize(
+    ("words", "letter"),
+    [
+        *[(words, "") for words in ("361", "N100E", "N E", "Other", "9999", "-20")],
+        *[("HN3", "3"), ("HNA", "A"), ("1", "1"), ("HN2", "2")],
+    ],
+)
+def test_unknown_and_numbered_directions_have_no_dip(words: str, letter: str):
+    # each may be the vertical, 1 and 2 beside a 3
+    direction = orientation(words)
+    assert set(direction) == {"direction"}
+    assert channel_code(100, direction) == f"HN{letter}"
 
 
 @pytest.mark.parametrize(
@@ -107,6 +116,7 @@ def test_unknown_directions_have_no_dip(words: str):
         ("x_UP.AT2", {"sensor_dip": -90.0}),
         ("kobe.000", horizontal(0)),
         ("E.AT2", horizontal(90)),
+        ("x_h2.AT2", {"direction": "H2", "sensor_dip": 0.0}),
         ("kobe.ver", {"sensor_dip": -90.0}),
         ("ELC-270.at2", horizontal(270)),
         # numbers of files, names of stations, of which the last letters are no direction
