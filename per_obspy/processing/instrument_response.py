@@ -44,8 +44,8 @@ LARGEST_MOTION, LARGEST_NUMBER, SMALLEST_MOTION, FEWEST_COUNTS = 100.0, 3000.0, 
 #: Zeros and poles below this are at zero frequency, rad/s or Hz.
 AT_ZERO = 1e-9
 
-#: Logarithm of the factor within which the peak of the header decides between units of the samples.
-PEAK_FACTOR = np.log(3.0)
+#: Factor within which the peak of the header decides between units of the samples (reasoned).
+PEAK_FACTOR = 3.0
 
 
 def as_recorded(trace: Trace) -> Trace:
@@ -78,6 +78,7 @@ def as_recorded(trace: Trace) -> Trace:
         unit, reason = _unit_by_samples(trace)
     if unit in (None, trace.stats.get("units", "counts")):
         return trace
+    # The header is that of the samples as they are
     out = copied_trace(trace)
     # Response, factor and peak describe counts, which these samples are not
     out.stats.pop("response", None)
@@ -96,29 +97,39 @@ def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
     units = _physical_units(trace)
     if not units or not samples.size or _are_whole(samples, 1.0):
         return None, ""
-    largest = max(np.abs(samples).max(), np.finfo(float).tiny)
-    peak = max(np.abs(samples - samples.mean()).max(), np.finfo(float).tiny)
+    tiny = np.finfo(float).tiny
+    peaks = [float(np.abs(part).max()) or tiny for part in (samples, samples - samples.mean())]
     header_peak = _header_peak(trace)
     for step, (unit, factor) in units.items():
         # The peak of the header is that of counts or of motion; a part of the record has less
-        is_counts, is_motion = (
-            header_peak and min(abs(np.log(largest / size)), abs(np.log(peak / size))) < PEAK_FACTOR
-            for size in (header_peak or 1.0, header_peak * factor or 1.0)
-        )
-        if is_counts or is_motion:
-            return unit if is_motion else None, f"{step}, as the header's peak shows"
-        most = np.exp(PEAK_FACTOR) * header_peak * factor or LARGEST_MOTION
-        if peak < most and _are_whole(samples, 1 / factor):
+        if _near(peaks, header_peak):
+            return None, ""
+        if _near(peaks, header_peak * factor):
+            return unit, f"{step}, as the header's peak shows"
+        most = PEAK_FACTOR * header_peak * factor or LARGEST_MOTION
+        if peaks[1] < most and _are_whole(samples, 1 / factor):
             return unit, f"{step}, without which they are whole numbers"
-        motion = peak * factor
-        if largest < LARGEST_NUMBER and motion < SMALLEST_MOTION and factor < 1 / FEWEST_COUNTS:
-            raise RecordRejected(
-                trace.id,
-                f"samples: no whole numbers up to {largest:.4g}, as counts no more than "
-                f"{motion:.2g} {unit}: they seem to be physical already; needs counts, or "
-                f"stats.units",
-            )
+        # No counts of any use: the factor is the small one of a count
+        _refuse_physical(trace, peaks, unit, factor)
     return None, ""
+
+
+def _near(peaks: list[float], header_peak: float) -> bool:
+    """Return whether a peak, with or without the mean, is about that of the header, if any."""
+    return header_peak > 0 and any(
+        1 / PEAK_FACTOR < peak / header_peak < PEAK_FACTOR for peak in peaks
+    )
+
+
+def _refuse_physical(trace: Trace, peaks: list[float], unit: str, factor: float) -> None:
+    """Refuse samples that could be motion in some unit, and as counts would be next to none."""
+    motion = peaks[1] * factor
+    if peaks[0] < LARGEST_NUMBER and motion < SMALLEST_MOTION and factor < 1 / FEWEST_COUNTS:
+        raise RecordRejected(
+            trace.id,
+            f"samples: no whole numbers up to {peaks[0]:.4g}, as counts no more than "
+            f"{motion:.2g} {unit}: they seem to be physical already; needs counts, or stats.units",
+        )
 
 
 def _physical_units(trace: Trace) -> dict[str, tuple[str, float]]:
@@ -152,6 +163,7 @@ def _are_whole(samples: FloatArray, factor: float) -> bool:
     Second differences are free of both. They must not be zeros alone. Samples that are not finite,
     which are rejected elsewhere, count as whole.
     """
+    # Around the peak, where steps are largest
     first = max(int(np.abs(samples).argmax()) - AROUND_PEAK, 0)
     if np.issubdtype(samples.dtype, np.integer) and factor == 1.0:
         return True
@@ -245,6 +257,7 @@ def with_overall_sensitivity(response: Response) -> Response:
     gains = [stage.stage_gain for stage in stages if stage.stage_gain is not None]
     if response.instrument_sensitivity is not None or not gains:
         return response
+    # A shallow copy: the stages stay those of the input
     out = copy(response)
     out.instrument_sensitivity = InstrumentSensitivity(
         float(np.prod(gains)),
@@ -270,10 +283,12 @@ def _response_of_sensor(trace: Trace, response: Response) -> tuple[str, Response
     channel = trace.stats.channel.upper()
     if unit == "m/s2" or not (re.fullmatch(SEED_CODE, channel) and channel[1] == "N"):
         return unit, response
+    # The first stage with zeros is the sensor
     sensor = next((one for one in response.response_stages if hasattr(one, "zeros")), None)
     if sensor is None or any(abs(zero) < AT_ZERO for zero in sensor.zeros):
         _warned(trace, f"response from {name!r}, but instrument code N is an accelerometer")
         return unit, response
+    # Samples and stages stay, the unit is the other one
     text = f"response from {name!r}, but an accelerometer (code N) flat to zero frequency"
     _warned(trace, f"{text}: taken as M/S**2")
     out = deepcopy(response)

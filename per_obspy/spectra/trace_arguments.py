@@ -23,6 +23,7 @@ ACCELERATION = "m/s2"
 #: ``remove_response`` that are in them.
 _UNITS = ("m", "m/s", ACCELERATION)
 _OUTPUTS = {"DISP": 0, "VEL": 1, "ACC": 2}
+_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 #: Steps in ``stats.processing``, of any version of ObsPy, that change the unit of the samples, with
 #: the output of ``remove_response``.
@@ -182,24 +183,29 @@ def unit_after_steps(stats: Any) -> str | None:
     ('m/s2', 'unknown after remove_response')
     """
     unit = stats.get("units")
-    is_physical = unit not in (None, "counts")
-    quantity = {"displacement": 0, "velocity": 1, "acceleration": 2}.get(stats.get("quantity"))
-    lines = np.atleast_1d(np.asarray(stats.get("processing", ()), dtype=object)).tolist()
-    steps = [(found[1], str(line)) for line in lines if (found := _STEP.search(str(line)))]
+    steps = _unit_steps(stats.get("processing", ()))
+    is_physical, quantity = unit not in (None, "counts"), _ORDERS.get(stats.get("quantity"))
     if not steps or (is_physical and quantity is None):
-        return unit if unit is None else str(unit)
+        return None if unit is None else str(unit)
     # Times of differentiation from displacement; None for counts
     order, is_removed = quantity if is_physical else None, False
     for step, line in steps:
         if step in ("differentiate", "integrate") and order is not None:
             order += 1 if step == "differentiate" else -1
-        elif step in ("remove_response", "remove_sensitivity") and not is_removed:
+        elif step.startswith("remove") and not is_removed:
             order, is_removed = _removed_to(step, line, stats), True
         else:
             order = None
-        if order is None or not 0 <= order < len(_UNITS):
+        # Beyond acceleration and displacement, or twice removed
+        if order not in _ORDERS.values():
             return f"unknown after {step}"
     return None if order is None else _UNITS[order]
+
+
+def _unit_steps(processing: ArrayLike) -> list[tuple[str, str]]:
+    """Return the steps that change the unit, each with its line."""
+    lines = map(str, np.atleast_1d(np.asarray(processing, dtype=object)).tolist())
+    return [(found[1], line) for line in lines if (found := _STEP.search(line))]
 
 
 def _removed_to(step: str, line: str, stats: Any) -> int | None:

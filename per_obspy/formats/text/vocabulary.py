@@ -179,6 +179,7 @@ def file_direction(name: str) -> dict[str, Any]:
         direction = {} if is_numbered else orientation(word)
         if is_direction(direction):
             return direction
+    # Without a separator only a whole code of SEED is no part of a name
     code = re.search(rf"{SEED_CODE}$", stem)
     return orientation(code[0]) if code and code[0][-1] in _FILE_CODES else {}
 

@@ -1,7 +1,7 @@
 """Components of a station: directions of sensors, instruments, pairs of horizontals."""
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
@@ -51,6 +51,7 @@ def oriented(stream: Iterable[Trace]) -> Stream:
     for trace in out:
         source = "metadata" if "sensor_azimuth" in trace.stats else "unknown"
         direction = direction_of(trace.stats.channel)
+        # Dip of -90 degrees: the vertical points upwards
         trace.stats.setdefault("sensor_dip", VERTICAL_DIPS.get(direction, 0.0))
         if source == "unknown" and direction in COMPASS_AZIMUTHS:
             trace.stats.sensor_azimuth, source = COMPASS_AZIMUTHS[direction], "channel code"
@@ -66,8 +67,8 @@ def direction_of(channel: str) -> str:
 
     U, V and W of SEED may be three inclined sensors, so that W is no west.
 
-    >>> [direction_of(code) for code in ("HNE", "EW2", "H1", "090", "Tran", "CH3", "HHW")]
-    ['E', 'EW', 'H1', '090', 'TRAN', 'CH', 'HHW']
+    >>> [direction_of(code) for code in ("HNE", "EW2", "H1", "090", "Tran", "HHW")]
+    ['E', 'EW', 'H1', '090', 'TRAN', 'HHW']
     """
     code = channel.upper()
     if code in HORIZONTAL_LETTERS or code in VERTICAL_DIPS or AZIMUTH_CODE.fullmatch(code):
@@ -97,24 +98,31 @@ def told_apart(instrument: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     # Words of the header where it has any
     words = [str(trace.stats.get("direction", trace.stats.channel)) for trace in instrument]
-    codes = set(map(direction_of, words))
-    unclear = {"1", "2", "3"} if codes & {"0", "3"} else set[str]()
-    unclear |= {"U", "V"} if any(len(code) == 3 and code.endswith("W") for code in codes) else set()
-    dips = [_dip(trace, unclear) for trace in instrument]
+    dips = _dips(instrument, words)
     has_vertical = any(dip is not None and abs(dip) >= VERTICAL_DIP for dip in dips)
-    counts = Counter(trace.id for trace in instrument)
+    is_alone = len(instrument) == 1
     apart, rejected = Stream(), []
     for trace, word, dip in zip(instrument, words, dips, strict=True):
-        if counts[trace.id] > 1:
-            same = zip(words, instrument, strict=True)
-            names = ", ".join(sorted(repr(name) for name, other in same if other.id == trace.id))
-            rejected.append(rejection(trace, f"directions {names} cannot be told apart"))
-        elif dip is None and not has_vertical and len(instrument) > 1:
+        # Identities of two, then directions that may be vertical
+        same = [name for name, other in zip(words, instrument, strict=True) if other.id == trace.id]
+        if len(same) > 1:
+            reason = f"directions {', '.join(map(repr, sorted(same)))} cannot be told apart"
+            rejected.append(rejection(trace, reason))
+        elif dip is None and not has_vertical and not is_alone:
             reason = f"direction {word!r} is unknown and no component is vertical: it may be that"
             rejected.append(rejection(trace, reason))
         else:
             apart += trace
     return apart, tuple(rejected)
+
+
+def _dips(instrument: Stream, words: list[str]) -> list[float | None]:
+    """Return the dips by header, metadata or code, degrees; None where none of them has it."""
+    codes = set(map(direction_of, words))
+    unclear = {"1", "2", "3"} if codes & {"0", "3"} else set[str]()
+    if any(len(code) == 3 and code.endswith("W") for code in codes):
+        unclear |= {"U", "V"}
+    return [_dip(trace, unclear) for trace in instrument]
 
 
 def _dip(trace: Trace, unclear: set[str]) -> float | None:
@@ -230,11 +238,13 @@ def _wrongly_sampled(instrument: Stream) -> list[Rejection]:
     The rate that most components share is right. Where as many components have another one, none
     can say which is wrong, and all of them are. Film has an interval for each component.
     """
+    # Each against those of another rate
     rejected = []
     recorded = [trace for trace in instrument if not trace.stats.get("digitised")]
     for trace in recorded:
         others = [other for other in recorded if not same_rate(trace, other)]
         contradicting = [other for other in others if _contradicting(trace, other)]
+        # More agree with the other rate, or as many do
         agreeing = len(recorded) - len(others)
         decisive = max((_sharing(other, recorded) for other in contradicting), default=0)
         if decisive >= agreeing:

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.processing.instrument_response import as_recorded
 from per_obspy.processing.notes import copied_trace, is_processed, taken
@@ -110,23 +111,36 @@ def _overlaid(pieces: Stream) -> tuple[Trace, NDArray[np.bool_]]:
         return ordered[0], np.zeros(ordered[0].stats.npts, dtype=bool)
     # The interval of the longest piece, by which its last sample is in its place
     out = copied_trace(ordered[0])
-    longest = max(ordered, key=lambda piece: piece.stats.npts)
-    start, dt = out.stats.starttime, longest.stats.delta
-    places = [round((piece.stats.starttime - start) / dt) for piece in ordered]
-    ends = [place + piece.stats.npts for place, piece in zip(places, ordered, strict=True)]
-    count = max(ends)
+    out.stats.delta = max(ordered, key=lambda piece: piece.stats.npts).stats.delta
+    spans = [_span(piece, out.stats.starttime, out.stats.delta) for piece in ordered]
+    count = max(span.stop for span in spans)
     if count > MOST_MISSING + sum(piece.stats.npts for piece in ordered):
-        raise RecordRejected(out.id, f"pieces are up to {count * dt:g} s apart")
+        raise RecordRejected(out.id, f"pieces are up to {count * out.stats.delta:g} s apart")
     samples, is_filled, contradicts = np.zeros(count), *np.zeros((2, count), dtype=bool)
-    for place, end, piece in zip(places, ends, ordered, strict=True):
-        part, is_present = np.ma.getdata(piece.data), ~np.ma.getmaskarray(piece.data)
-        before = slice(place, end)
-        contradicts[before] |= is_present & is_filled[before] & (samples[before] != part)
-        samples[before] = np.where(is_present, part, samples[before])
-        is_filled[before] |= is_present
+    for span, piece in zip(spans, ordered, strict=True):
+        _lay(piece, samples[span], is_filled[span], contradicts[span])
+    # Masked only where it must be
     out.data = samples if is_filled.all() else np.ma.masked_array(samples, ~is_filled)
-    out.stats.delta = dt
     return out, contradicts
+
+
+def _lay(
+    piece: Trace,
+    samples: FloatArray,
+    is_filled: NDArray[np.bool_],
+    contradicts: NDArray[np.bool_],
+) -> None:
+    """Compare a piece with the samples that are there already, and write it in their place."""
+    part, is_present = np.ma.getdata(piece.data), ~np.ma.getmaskarray(piece.data)
+    contradicts |= is_present & is_filled & (samples != part)
+    samples[is_present] = part[is_present]
+    is_filled |= is_present
+
+
+def _span(piece: Trace, start: UTCDateTime, dt: float) -> slice:
+    """Return the places of the samples of a piece, from a start in steps of an interval, s."""
+    first = round((piece.stats.starttime - start) / dt)
+    return slice(first, first + piece.stats.npts)
 
 
 def _has_gaps(pieces: Stream) -> bool:
@@ -137,25 +151,28 @@ def _has_gaps(pieces: Stream) -> bool:
 def _differences(pieces: Stream) -> list[str]:
     """Return the properties in which the pieces of a channel differ, with their values."""
     places = [piece.stats.get("coordinates") or {} for piece in pieces]
-    values: dict[str, list[Any]] = {
+    fields: dict[str, list[Any]] = {
         "sampling_rate": [piece.stats.sampling_rate for piece in pieces],
         "calib": [piece.stats.calib for piece in pieces],
         "sensitivity": [_sensitivity(piece) for piece in pieces],
         "latitude": [place.get("latitude") for place in places],
         "longitude": [place.get("longitude") for place in places],
-        "units": [piece.stats.get("units", "counts") for piece in pieces],
     }
     # Rounding is no difference, neither are two descriptions of one place
     reasons = []
-    for field, of_pieces in values.items():
-        texts = sorted({str(value) for value in of_pieces if value is not None})
-        numbers = [float(value) for value in of_pieces if isinstance(value, int | float)]
+    for field, values in fields.items():
+        known = [value for value in values if value is not None]
         margin = SAME_PLACE if field in ("latitude", "longitude") else 0.0
-        if len(texts) > 1 and not np.allclose(
-            numbers or np.nan, numbers[:1] or np.nan, SAMPLING_TOLERANCE, margin
-        ):
-            reasons.append(f"pieces differ in {field}: {', '.join(texts)}")
-    return reasons
+        if not np.allclose(known, known[:1] or 0.0, SAMPLING_TOLERANCE, margin):
+            reasons.append(_difference(field, known))
+    # Counts are what has no unit
+    units = [str(piece.stats.get("units", "counts")) for piece in pieces]
+    return reasons if len(set(units)) == 1 else [*reasons, _difference("units", units)]
+
+
+def _difference(field: str, values: list[Any]) -> str:
+    """Return the reason for a property in which pieces differ."""
+    return f"pieces differ in {field}: {', '.join(sorted(set(map(str, values))))}"
 
 
 def _sensitivity(trace: Trace) -> float | None:

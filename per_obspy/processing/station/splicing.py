@@ -46,18 +46,13 @@ def _spliced_pair(first: Trace | None, second: Trace) -> Trace | None:
     """Return two pieces as one trace, None if they agree at no overlap."""
     if first is None:
         return None
-    # Overlap by the samples, and by the clocks
+    # Overlap by the clocks, and by the samples
     dt = first.stats.delta
-    by_clocks = (first.stats.endtime - second.stats.starttime) / dt + 1
-    # By their clocks one covers the other: they are copies, not parts
-    if by_clocks >= min(first.stats.npts, second.stats.npts):
-        return None
-    shortest = max(round(SHORTEST_OVERLAP / dt), math.ceil(by_clocks - LARGEST_SHIFT / dt))
-    longest = min(round(LONGEST_OVERLAP / dt), math.floor(by_clocks + LARGEST_SHIFT / dt))
-    count, agreement = best_overlap(first.data, second.data, shortest, longest)
+    by_clocks = float((first.stats.endtime - second.stats.starttime) / dt + 1)
+    count, agreement = _agreed_overlap(first, second, by_clocks)
     if agreement < AGREEMENT:
         return None
-    shift = float(by_clocks - count) * dt
+    shift = (by_clocks - count) * dt
     # The first piece fades into the second
     fade = np.linspace(0, 1, count)
     both = (1 - fade) * first.data[-count:] + fade * second.data[:count]
@@ -66,6 +61,17 @@ def _spliced_pair(first: Trace | None, second: Trace) -> Trace | None:
     place = f"pieces joined where they agree ({agreement:.3f}), {shift:.2f} s from their clocks"
     noted(out, place, splice_shift=shift)
     return out
+
+
+def _agreed_overlap(first: Trace, second: Trace, by_clocks: float) -> tuple[int, float]:
+    """Return the best overlap of two pieces, samples, and its concordance, 0 if there is none."""
+    # By their clocks one covers the other: they are copies, not parts
+    if by_clocks >= min(first.stats.npts, second.stats.npts):
+        return 0, 0.0
+    rate = first.stats.sampling_rate
+    shortest = max(round(SHORTEST_OVERLAP * rate), math.ceil(by_clocks - LARGEST_SHIFT * rate))
+    longest = min(round(LONGEST_OVERLAP * rate), math.floor(by_clocks + LARGEST_SHIFT * rate))
+    return best_overlap(first.data, second.data, shortest, longest)
 
 
 def best_overlap(
