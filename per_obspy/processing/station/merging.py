@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from obspy import Stream, Trace, UTCDateTime
+from obspy import Stream, Trace
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected, Rejection
@@ -112,10 +112,8 @@ def _overlaid(pieces: Stream) -> tuple[Trace, NDArray[np.bool_]]:
     # The interval of the longest piece, by which its last sample is in its place
     out = copied_trace(ordered[0])
     out.stats.delta = max(ordered, key=lambda piece: piece.stats.npts).stats.delta
-    spans = [_span(piece, out.stats.starttime, out.stats.delta) for piece in ordered]
+    spans = _spans(ordered, out.stats.delta)
     count = max(span.stop for span in spans)
-    if count > MOST_MISSING + sum(piece.stats.npts for piece in ordered):
-        raise RecordRejected(out.id, f"pieces are up to {count * out.stats.delta:g} s apart")
     samples, is_filled, contradicts = np.zeros(count), *np.zeros((2, count), dtype=bool)
     for span, piece in zip(spans, ordered, strict=True):
         _lay(piece, samples[span], is_filled[span], contradicts[span])
@@ -137,10 +135,18 @@ def _lay(
     is_filled |= is_present
 
 
-def _span(piece: Trace, start: UTCDateTime, dt: float) -> slice:
-    """Return the places of the samples of a piece, from a start in steps of an interval, s."""
-    first = round((piece.stats.starttime - start) / dt)
-    return slice(first, first + piece.stats.npts)
+def _spans(ordered: list[Trace], dt: float) -> list[slice]:
+    """Return the places of the samples of each piece, in steps of an interval, s."""
+    start, samples, spans = ordered[0].stats.starttime, 0, []
+    for piece in ordered:
+        first = round((piece.stats.starttime - start) / dt)
+        spans.append(slice(first, first + piece.stats.npts))
+        samples += piece.stats.npts
+    # All of them would be in memory
+    count = max(span.stop for span in spans)
+    if count > MOST_MISSING + samples:
+        raise RecordRejected(ordered[0].id, f"pieces are up to {count * dt:g} s apart")
+    return spans
 
 
 def _has_gaps(pieces: Stream) -> bool:
