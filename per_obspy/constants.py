@@ -27,3 +27,35 @@ METRES_PER_DEGREE = 111_195.0
 
 #: Dip of the sensor axis, degrees from horizontal, from which a component is vertical.
 VERTICAL_DIP = 45.0
+
+#: Channel code of SEED: band, instrument of ground motion, direction.
+SEED_CODE = r"[A-Z][GHLMN][A-Z0-9]"
+
+#: Words of headers and channels for a vertical sensor -> its dip, degrees down from horizontal.
+VERTICAL_DIPS = {
+    **dict.fromkeys(
+        ("UP", "UPDO", "U", "Z", "V", "VER", "VERT", "VERTICAL", "UD", "U-D", "VRT", "VRTC"), -90.0
+    ),
+    **dict.fromkeys(("DOWN", "DWN", "DN", "-UP", "D"), 90.0),
+}
+
+#: Words for the points of the compass -> degrees clockwise from north.
+COMPASS_AZIMUTHS = {
+    **dict.fromkeys(("N", "NS", "N-S", "SN", "NORTH"), 0.0),
+    **dict.fromkeys(("E", "EW", "E-W", "WE", "EAST"), 90.0),
+    **dict.fromkeys(("S", "SOUTH"), 180.0),
+    **dict.fromkeys(("W", "WEST"), 270.0),
+}
+
+#: Words for horizontal sensors without an azimuth -> last letter of their channel code: along and
+#: across a structure, from and around a source, normal and parallel to a fault (COSMOS, NGA).
+HORIZONTAL_LETTERS = {
+    **dict.fromkeys(("L", "LN", "LG", "LNG", "LON", "LONG", "LONGITUDINAL"), "L"),
+    **dict.fromkeys(("T", "TR", "TRN", "TRA", "TRAN", "TRANS", "TRANSVERSE", "TRANSVERSAL"), "T"),
+    **dict.fromkeys(("R", "RAD", "RADL", "RADIAL"), "R"),
+    **dict.fromkeys(("H", "HOR", "HORIZ", "HORIZONTAL"), "H"),
+    **dict.fromkeys(("1", "H1", "HOR1", "FN"), "1"),
+    **dict.fromkeys(("2", "H2", "HOR2", "FP"), "2"),
+    "X": "X",
+    "Y": "Y",
+}

@@ -46,6 +46,12 @@ class MotionUnit(NamedTuple):
     factor: float
 
 
+def unit_of_si(text: object) -> MotionUnit | None:
+    """Return the unit of SI that metadata name, as :func:`motion_unit`; None for any other."""
+    unit = motion_unit(str(text))
+    return unit if unit and unit.factor == 1.0 else None
+
+
 def motion_unit(text: str) -> MotionUnit | None:
     """
     Return the unit of ground motion that a text names; None for any other text.

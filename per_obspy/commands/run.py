@@ -60,6 +60,7 @@ WARNINGS = {
     "contradicting_coordinates": "with contradicting coordinates",
     "record_warning": "with other warnings",
     "one_horizontal": "with one horizontal",
+    "unknown_azimuths": "with horizontals of unknown azimuth",
 }
 
 #: Stations of each warning that are printed by name.

@@ -270,7 +270,7 @@ def _words(header: _Header) -> dict[str, Any]:
     seed = _seed_names(header)
     words |= seed
     direction = orientation(channel[1]) if channel else {}
-    if not direction and seed.get("channel", "").endswith("Z"):
+    if "sensor_dip" not in direction and seed.get("channel", "").endswith("Z"):
         direction = {"sensor_dip": -90.0}
     return words | direction
 
@@ -317,10 +317,10 @@ def _seed_names(header: _Header) -> dict[str, str]:
 
 
 def _channel_code(header: _Header, words: dict[str, Any], dt: float) -> str:
-    """Return the SEED channel code; channels of unknown orientation have the number of the file."""
-    code = channel_code(1 / dt, words)
-    number = int(header.integers[50])
-    return code if len(code) == 3 or number < 1 else f"{code}{number % 10}"
+    """Return the SEED channel code; channels without an azimuth have the number of the file."""
+    code, number = channel_code(1 / dt, words), int(header.integers[50])
+    is_numbered = number > 0 and (len(code) < 3 or "direction" in words)
+    return f"{code[:2]}{number % 10}" if is_numbered else code
 
 
 def _gain(text: Text, header: _Header) -> float:

@@ -27,7 +27,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, orientation, trace
+from per_obspy.formats.text.vocabulary import coordinates, is_direction, orientation, trace
 
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s++(\w)\(\+\);?\s*+(\w)\(\+\);?\s*+(\w)\(\+\)")
@@ -81,7 +81,7 @@ def _directions(text: Text, fields: Fields) -> tuple[str, ...]:
         refuse(text, unit.line, "AmplitudeUnit", f"{unit.value!r} is not gal")
     # All three must be directions
     names = _COLUMNS.match(columns.value)
-    if names is None or not all(orientation(name) for name in names.groups()):
+    if names is None or not all(is_direction(orientation(name)) for name in names.groups()):
         problem = f"{columns.value!r} is not time and three directions"
         refuse(text, columns.line, "DataSequence", problem)
     return names.groups()

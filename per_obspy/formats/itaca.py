@@ -57,7 +57,8 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     words = _processing(text, fields) | {"event": {"time": _event_time(text, fields)}}
     words |= _station(text, fields)
     words |= orientation(required_field(text, fields, "Orientation").value)
-    return Stream([trace(values, interval_field(text, fields, "Time Increment (s)"), words)])
+    dt = interval_field(text, fields, "Time Increment (s)")
+    return Stream([trace(values, dt, words, text.name)])
 
 
 def _samples(text: Text, samples: int) -> FloatArray:

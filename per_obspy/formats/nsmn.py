@@ -33,7 +33,7 @@ from per_obspy.formats.text.places import (
     epicentre_place,
     station_place,
 )
-from per_obspy.formats.text.vocabulary import orientation, trace
+from per_obspy.formats.text.vocabulary import is_direction, orientation, trace
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
@@ -70,7 +70,7 @@ def read_nsmn(file: WaveformFile, **_unused: Any) -> Stream:
 def _directions(text: Text) -> list[str]:
     """Return the directions of the three columns."""
     directions = line_at(text, _HEADER_LINES - 1, "components").split()
-    if not all(orientation(direction) for direction in directions) or len(directions) != 3:
+    if len(directions) != 3 or not all(is_direction(orientation(name)) for name in directions):
         problem = f"expected three directions, got {directions}"
         refuse(text, _HEADER_LINES - 1, "components", problem)
     return directions

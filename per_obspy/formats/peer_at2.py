@@ -27,7 +27,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import orientation, trace
+from per_obspy.formats.text.vocabulary import channel_code, orientation, trace
 
 _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"
@@ -79,7 +79,7 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
     # Words of the header
     words = {"units": unit, "quantity": units[1].lower(), "processing_level": "processed"}
     words |= _title(text) | {"corners": _corners(text)}
-    return Stream([trace(values, dt, words)])
+    return Stream([trace(values, dt, words, text.name)])
 
 
 def _size(text: Text) -> tuple[int, float]:
@@ -96,8 +96,12 @@ def _title(text: Text) -> dict[str, Any]:
     """Return event, date, station and orientation of the second line."""
     title = _TITLE.fullmatch(text.lines[1].strip())
     if title is None:
-        name = text.lines[1].split(",")[0].strip()
-        return {"station": _code(name), "station_name": name}
+        name, *parts = text.lines[1].split(",")
+        # Without a date the direction may still be the last word
+        direction = orientation(parts[-1]) if parts else {}
+        is_named = bool(direction) and len(channel_code(1.0, direction)) == 3
+        known = direction if is_named else {}
+        return {"station": _code(name), "station_name": name.strip(), **known}
     event, month, day, year, station, component = title.groups()
     start = utc(text, 1, "date", (full_year(year), int(month), int(day)))
     # The format has no station codes

@@ -57,7 +57,7 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     # Words of the header
     words = _quantity(title[1]) | {"starttime": _start(text, integers)}
     words |= _station(text, integers, reals) | _numbers(reals) | _direction(integers)
-    return Stream([trace(values, dt, words | film)])
+    return Stream([trace(values, dt, words | film, text.name)])
 
 
 def _samples(

@@ -22,7 +22,6 @@ from per_obspy.formats.text.lines import (
 from per_obspy.formats.text.number_blocks import titled_block
 from per_obspy.formats.text.places import Angle, epicentre_place, station_place
 from per_obspy.formats.text.vocabulary import (
-    channel_code,
     corners,
     orientation,
     sensor_constants,
@@ -103,8 +102,7 @@ def _volume_2(text: Text, first: int) -> tuple[Trace, int]:
             problem = f"{len(integral)} samples, acceleration has {len(values)}"
             refuse(text, line - 1, kind, problem)
     # Samples are in gal
-    words |= _corrected_words(text, first) | {"channel": channel_code(1 / dt, words)}
-    return trace(GAL * values, dt, words), line
+    return trace(GAL * values, dt, words | _corrected_words(text, first)), line
 
 
 def _corrected_words(text: Text, first: int) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
 from per_obspy.screening.building_rows.members import IntArray
 from per_obspy.screening.values import Columns, chosen, components
+from per_obspy.spectra.station import lacks_azimuths
 from per_obspy.tables.building_rows import write_rows_part
 
 #: Contacts of a chunk, about: a worker needs 1 kB for each.
@@ -127,6 +128,9 @@ def do_rows(job: RowsJob) -> RowsPart:
     if job.station is None:
         return _recorded(job, contacts, no_outcomes(job.contacts.num_rows), ())
     dataset = read_station_once(job.station.shard, job.station.hash)
+    if lacks_azimuths(dataset):
+        reason = f"the azimuths of the horizontals of {dataset['station'].item()} are unknown"
+        return _recorded(job, contacts, *_all_rejected(job, reason))
     # Along a single horizontal whatever the axis: it counts as north
     one_horizontal = dataset.sizes["horizontal"] == 1
     if one_horizontal:
@@ -236,9 +240,13 @@ def _name(job: RowsJob) -> str:
 
 def _failed(job: RowsJob, reason: str) -> RowsPart:
     """Return a part without histories after a failure; the next run repeats it."""
-    contacts = _columns(job.contacts)
-    names = dict.fromkeys(contacts["row_id"].tolist())
-    rejected = [Rejection("row", name, "", None, (reason,)) for name in names]
     undone = job._replace(key="")
-    part = _recorded(undone, contacts, no_outcomes(job.contacts.num_rows), rejected)
+    part = _recorded(undone, _columns(job.contacts), *_all_rejected(job, reason))
     return part._replace(failed=True)
+
+
+def _all_rejected(job: RowsJob, reason: str) -> tuple[Columns, tuple[Rejection, ...]]:
+    """Return the outcomes and rejections of a chunk of which no row has a history."""
+    names = dict.fromkeys(job.contacts["row_id"].to_pylist())
+    rejected = tuple(Rejection("row", str(name), "", None, (reason,)) for name in names)
+    return no_outcomes(job.contacts.num_rows), rejected

@@ -12,7 +12,12 @@ from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.processing.instrument import process_instrument
 from per_obspy.processing.noise.windows import Source, source_of
 from per_obspy.processing.notes import rejection, taken
-from per_obspy.processing.station.components import instruments, is_horizontal, oriented
+from per_obspy.processing.station.components import (
+    instruments,
+    is_horizontal,
+    oriented,
+    told_apart,
+)
 from per_obspy.processing.station.merging import merged
 from per_obspy.processing.station.structures import kept_apart
 
@@ -101,7 +106,7 @@ def process_station(
     """
     ground, structure = kept_apart(stream)
     candidates, unusable = process_instruments(taken(ground), settings, event)
-    best = max(candidates, key=lambda traces: sum(map(is_horizontal, traces)), default=Stream())
+    best = max(candidates, key=_components, default=Stream())
     rejected = list(unusable)
     # Other instruments at the same place
     for traces in candidates:
@@ -118,6 +123,11 @@ def process_station(
         reason = f"in a structure ({trace.stats.sensor_location}): kept apart"
         rejected.append(rejection(trace, reason))
     return best, tuple(rejected)
+
+
+def _components(traces: Stream) -> tuple[int, int]:
+    """Return the number of horizontals of an instrument, and of all its components."""
+    return sum(map(is_horizontal, traces)), len(traces)
 
 
 def process_instruments(
@@ -146,8 +156,12 @@ def process_instruments(
         source = event
     processed, rejected = [], list(broken)
     # Each instrument by itself
-    for instrument in instruments(oriented(taken(whole))):
-        traces, unusable = process_instrument(taken(instrument), settings, source)
+    for instrument in instruments(taken(whole)):
+        components, unclear = told_apart(instrument)
+        # Each component has one owner, and leaves memory when it is done
+        instrument.clear()
+        directed = oriented(taken(components))
+        traces, unusable = process_instrument(taken(directed), settings, source)
         processed += [traces] if traces else []
-        rejected += unusable
+        rejected += (*unclear, *unusable)
     return processed, tuple(rejected)

@@ -1,24 +1,26 @@
 """Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
+import re
 from collections.abc import Callable
+from copy import copy, deepcopy
 
 import numpy as np
 from numpy.typing import NDArray
 from obspy import Stream, Trace
 from obspy.core.inventory import Response
-from obspy.core.inventory.response import ResponseStage
+from obspy.core.inventory.response import InstrumentSensitivity, ResponseStage
 from obspy.signal.invsim import cosine_sac_taper
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import GAL, SEED_CODE
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.long_records import blocks, forget_plans
-from per_obspy.processing.notes import copied, noted
-
-#: Units of the ground motion in a response.
-ACCELERATION_UNITS = ("M/S**2", "M/S^2", "M/S/S", "M/SEC**2", "M/(S**2)")
-VELOCITY_UNITS = ("M/S", "M/SEC")
+from per_obspy.processing.notes import copied, copied_trace, noted
+from per_obspy.processing.quality.findings import Finding, judged
+from per_obspy.spectra.trace_arguments import unit_after_steps
+from per_obspy.units import unit_of_si
 
 #: The pre-filter of velocity sensors rises from 0 to 1 in this band, Hz; that of accelerometers
 #: leaves low frequencies unchanged.
@@ -28,9 +30,153 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
 
-
 #: Most seconds of zeros behind a record: the response of the filter is much shorter.
 LONGEST_PAD = 3600.0
+
+#: Samples around the peak that show whether they are whole numbers; their largest distance from
+#: them, least share of them, and fewest steps between them (reasoned).
+AROUND_PEAK, OFF_WHOLE, MOSTLY_WHOLE, FEWEST_STEPS = 5000, 0.05, 0.99, 20
+
+#: Samples that are no whole numbers may be ground motion up to 100 m/s2 or m/s. Up to 3000 (gal)
+#: they are no counts where these would be less than 0.02 m/s2 or m/s, with more than 100 of them to
+#: a unit: a filtered record of weak motion is refused as well (reasoned).
+LARGEST_MOTION, LARGEST_NUMBER, SMALLEST_MOTION, FEWEST_COUNTS = 100.0, 3000.0, 0.02, 100.0
+
+#: Zeros and poles below this are at zero frequency, rad/s or Hz.
+AT_ZERO = 1e-9
+
+#: Factor within which the peak of the header decides between units of the samples (reasoned).
+PEAK_FACTOR = 3.0
+
+
+def as_recorded(trace: Trace) -> Trace:
+    """
+    Return a trace in the unit that its samples have, which ObsPy's header may not tell.
+
+    ObsPy removes responses and sensitivities and multiplies by ``calib``, and leaves all of them in
+    the header. ``stats.processing`` names the step; where that is lost, as in a file, the peak of
+    the header decides, or the factor that makes the samples whole numbers of counts.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+        Raw or not, with ``units`` or without.
+
+    Returns
+    -------
+    obspy Trace
+        The same, or a copy with another unit and without the response.
+
+    Raises
+    ------
+    RecordRejected
+        If the samples are no counts, and their unit is unknown.
+    """
+    unit, reason = unit_after_steps(trace.stats), "steps of ObsPy"
+    if unit is not None and unit.startswith("unknown"):
+        raise RecordRejected(trace.id, f"units {unit}, needs m/s2 or counts with a response")
+    if unit in (None, "counts"):
+        unit, reason = _unit_by_samples(trace)
+    if unit in (None, trace.stats.get("units", "counts")):
+        return trace
+    # The header is that of the samples as they are
+    out = copied_trace(trace)
+    # Response, factor and peak describe counts, which these samples are not
+    out.stats.pop("response", None)
+    if trace.stats.get("units", "counts") == "counts":
+        out.stats.pop("header_peak", None)
+    out.stats.calib, out.stats.units = 1.0, unit
+    if motion := unit_of_si(unit):
+        out.stats.quantity = motion.quantity
+    noted(out, f"in {unit} already, by {reason}", conversion=reason)
+    return out
+
+
+def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
+    """Return the unit of samples that should be counts, None if they are, and what shows it."""
+    samples = np.ma.getdata(trace.data)
+    units = _physical_units(trace)
+    if not units or not samples.size or _are_whole(samples, 1.0):
+        return None, ""
+    tiny = np.finfo(float).tiny
+    peaks = [float(np.abs(part).max()) or tiny for part in (samples, samples - samples.mean())]
+    header_peak = _header_peak(trace)
+    for step, (unit, factor) in units.items():
+        # The peak of the header is that of counts or of motion; a part of the record has less
+        if _near(peaks, header_peak):
+            return None, ""
+        if _near(peaks, header_peak * factor):
+            return unit, f"{step}, as the header's peak shows"
+        most = PEAK_FACTOR * header_peak * factor or LARGEST_MOTION
+        if peaks[1] < most and _are_whole(samples, 1 / factor):
+            return unit, f"{step}, without which they are whole numbers"
+        # No counts of any use: the factor is the small one of a count
+        _refuse_physical(trace, peaks, unit, factor)
+    return None, ""
+
+
+def _near(peaks: list[float], header_peak: float) -> bool:
+    """Return whether a peak, with or without the mean, is about that of the header, if any."""
+    return header_peak > 0 and any(
+        1 / PEAK_FACTOR < peak / header_peak < PEAK_FACTOR for peak in peaks
+    )
+
+
+def _refuse_physical(trace: Trace, peaks: list[float], unit: str, factor: float) -> None:
+    """Refuse samples that could be motion in some unit, and as counts would be next to none."""
+    motion = peaks[1] * factor
+    if peaks[0] < LARGEST_NUMBER and motion < SMALLEST_MOTION and factor < 1 / FEWEST_COUNTS:
+        raise RecordRejected(
+            trace.id,
+            f"samples: no whole numbers up to {peaks[0]:.4g}, as counts no more than "
+            f"{motion:.2g} {unit}: they seem to be physical already; needs counts, or stats.units",
+        )
+
+
+def _physical_units(trace: Trace) -> dict[str, tuple[str, float]]:
+    """Return what may have been applied to counts -> unit of the result, and unit per count."""
+    stats = trace.stats
+    units = {}
+    # ObsPy's K-NET reader gives m/s2 without naming the quantity
+    if stats.calib not in (0.0, 1.0):
+        is_acceleration = stats.get("quantity") == "acceleration" or "knet" in stats
+        unit = "m/s2" if is_acceleration else "counts times calib"
+        units["apply_calib"] = (unit, abs(float(stats.calib)))
+    sensitivity = getattr(stats.get("response"), "instrument_sensitivity", None)
+    motion = unit_of_si(getattr(sensitivity, "input_units", ""))
+    if sensitivity and motion and sensitivity.value:
+        units["remove_sensitivity"] = (motion.name, 1 / abs(float(sensitivity.value)))
+    return units
+
+
+def _header_peak(trace: Trace) -> float:
+    """Return the peak of the header, counts; 0 if there is none."""
+    if "header_peak" in trace.stats:
+        return float(trace.stats.header_peak or 0.0)
+    peak = trace.stats.get("knet", {}).get("accmax") or 0.0
+    return float(peak) * GAL / trace.stats.calib if trace.stats.calib else 0.0
+
+
+def _are_whole(samples: FloatArray, factor: float) -> bool:
+    """
+    Return whether samples times a factor are whole numbers but for their mean and a line.
+
+    Second differences are free of both. They must not be zeros alone. Samples that are not finite,
+    which are rejected elsewhere, count as whole.
+    """
+    # Around the peak, where steps are largest
+    first = max(int(np.abs(samples).argmax()) - AROUND_PEAK, 0)
+    if np.issubdtype(samples.dtype, np.integer) and factor == 1.0:
+        return True
+    part = samples[first : first + 2 * AROUND_PEAK].astype(np.float64) * factor
+    if not np.isfinite(part).all():
+        return True
+    if np.array_equal(part, np.round(part)):
+        return bool(part.any()) or factor == 1.0
+    bends = np.diff(part, 2)
+    nearest = np.round(bends)
+    is_near = np.abs(bends - nearest) < OFF_WHOLE
+    return bool(np.count_nonzero(nearest) >= FEWEST_STEPS and is_near.mean() >= MOSTLY_WHOLE)
 
 
 def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
@@ -66,24 +212,30 @@ def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
     out = copied(stream)
     for trace in out:
         units = trace.stats.get("units", "counts")
-        if units not in ("m/s2", "counts"):
-            raise RecordRejected(trace.id, f"units {units!r}, needs m/s2 or counts with a response")
         if units == "counts":
             _convert(trace, gain_tolerance)
+        elif units != "m/s2":
+            problem = f"units {units!r}, needs m/s2 or counts with a response"
+            if units == "m/s":
+                problem += "; remove_response with output='ACC', or differentiate"
+            raise RecordRejected(trace.id, problem)
     return out
 
 
 def _convert(trace: Trace, tolerance: float) -> None:
     """Convert the copy of a step from counts to m/s2."""
     response = trace.stats.get("response")
+    if response is not None:
+        response = with_overall_sensitivity(response)
     if response is None or response.instrument_sensitivity is None:
         _multiply_calibration(trace)
     else:
-        is_accelerometer = _is_accelerometer(trace, response)
         _require_consistent(trace, response, tolerance)
+        unit, response = _response_of_sensor(trace, response)
         if any(type(stage) is not ResponseStage for stage in response.response_stages):
-            _deconvolve(trace, ACCELERATION_BAND if is_accelerometer else VELOCITY_BAND)
-        elif is_accelerometer:
+            band = ACCELERATION_BAND if unit == "m/s2" else VELOCITY_BAND
+            _deconvolve(trace, response, band)
+        elif unit == "m/s2":
             _divide_sensitivity(trace, response)
         else:
             raise RecordRejected(
@@ -95,6 +247,63 @@ def _convert(trace: Trace, tolerance: float) -> None:
     trace.stats.units, trace.stats.quantity = "m/s2", "acceleration"
 
 
+def with_overall_sensitivity(response: Response) -> Response:
+    """
+    Return a response with an overall sensitivity, which is optional in StationXML.
+
+    It is the product of the gains of the stages, as in ObsPy. Unchanged where it is there already,
+    or where no stage has a gain.
+    """
+    stages = response.response_stages
+    gains = [stage.stage_gain for stage in stages if stage.stage_gain is not None]
+    if response.instrument_sensitivity is not None or not gains:
+        return response
+    # A shallow copy: the stages stay those of the input
+    out = copy(response)
+    out.instrument_sensitivity = InstrumentSensitivity(
+        float(np.prod(gains)),
+        stages[0].stage_gain_frequency or 0.0,
+        next((stage.input_units for stage in stages if stage.input_units), None),
+        stages[-1].output_units,
+    )
+    return out
+
+
+def _response_of_sensor(trace: Trace, response: Response) -> tuple[str, Response]:
+    """
+    Return the unit of ground motion of a response, and the response with that unit.
+
+    Instrument code N is an accelerometer. Where StationXML names M/S for it and its poles and zeros
+    pass a constant motion, the name is wrong: a sensor of velocity has no such response, as it
+    needs moving ground. Its record is then converted as acceleration, with a warning.
+    """
+    name = str(response.instrument_sensitivity.input_units)
+    motion = unit_of_si(name)
+    unit = motion.name if motion else ""
+    if unit not in ("m/s2", "m/s"):
+        raise RecordRejected(trace.id, f"response from {name!r}, needs M/S**2 or M/S")
+    channel = trace.stats.channel.upper()
+    if unit == "m/s2" or not (re.fullmatch(SEED_CODE, channel) and channel[1] == "N"):
+        return unit, response
+    # The first stage with zeros is the sensor
+    sensor = next((one for one in response.response_stages if hasattr(one, "zeros")), None)
+    if sensor is None or any(abs(zero) < AT_ZERO for zero in sensor.zeros):
+        _warned(trace, f"response from {name!r}, but instrument code N is an accelerometer")
+        return unit, response
+    # Samples and stages stay, the unit is the other one
+    text = f"response from {name!r}, but an accelerometer (code N) flat to zero frequency"
+    _warned(trace, f"{text}: taken as M/S**2")
+    out = deepcopy(response)
+    out.instrument_sensitivity.input_units = out.response_stages[0].input_units = "M/S**2"
+    return "m/s2", out
+
+
+def _warned(trace: Trace, reason: str) -> None:
+    """Add a warning to the copy of a step."""
+    [judged_trace] = judged(trace, [Finding("response_units", "warn", reason)])
+    trace.stats.per_obspy = judged_trace.stats.per_obspy
+
+
 def _multiply_calibration(trace: Trace) -> None:
     """Multiply by the reader's factor, if it is one to acceleration."""
     # ObsPy's K-NET reader gives m/s2 without naming the quantity
@@ -103,14 +312,6 @@ def _multiply_calibration(trace: Trace) -> None:
         raise RecordRejected(trace.id, "counts without a response or a calibration factor")
     trace.data = trace.data * trace.stats.calib
     noted(trace, f"multiplied by calib {trace.stats.calib:g} m/s2", conversion="calibration factor")
-
-
-def _is_accelerometer(trace: Trace, response: Response) -> bool:
-    """Return whether a response is one to acceleration; reject other units than velocity."""
-    units = str(response.instrument_sensitivity.input_units).upper()
-    if units not in ACCELERATION_UNITS + VELOCITY_UNITS:
-        raise RecordRejected(trace.id, f"response from {units!r}, needs M/S**2 or M/S")
-    return units in ACCELERATION_UNITS
 
 
 def _require_consistent(trace: Trace, response: Response, tolerance: float) -> None:
@@ -134,7 +335,7 @@ def _divide_sensitivity(trace: Trace, response: Response) -> None:
     noted(trace, f"divided by sensitivity {sensitivity:g} counts/(m/s2)", conversion="sensitivity")
 
 
-def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
+def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> None:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
     band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up samples that the filter moves around
@@ -142,7 +343,7 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
     step = 1 / (length * dt)
     try:
-        response_at = _interpolated(trace.stats.response, step, length // 2 * step)
+        response_at = _interpolated(response, step, length // 2 * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
     # Taper and response of a day would take more memory than the record: block by block

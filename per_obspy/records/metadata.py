@@ -19,17 +19,10 @@ from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
 from per_obspy.names import code_problem
+from per_obspy.processing.instrument_response import with_overall_sensitivity
 from per_obspy.records.coordinate_sources import STATIONXML, Place, place_noted, table_of
 from per_obspy.records.simulation.station_metadata import MARK
-
-#: input unit of a response -> quantity of the samples
-_QUANTITIES = {
-    "M/S**2": "acceleration",
-    "M/S/S": "acceleration",
-    "M/(S**2)": "acceleration",
-    "M/S": "velocity",
-    "M": "displacement",
-}
+from per_obspy.units import unit_of_si
 
 _CODES = ("network", "station", "location", "channel")
 
@@ -147,8 +140,10 @@ def _channel_facts(channel: Channel) -> dict[str, Any]:
 
 
 def _sensitivity(channel: Channel) -> float | None:
-    """Return the sensitivity, counts per unit of the ground motion, or None."""
-    sensitivity = channel.response.instrument_sensitivity if channel.response else None
+    """Return the overall sensitivity, counts per unit of the ground motion, or None."""
+    if channel.response is None:
+        return None
+    sensitivity = with_overall_sensitivity(channel.response).instrument_sensitivity
     return sensitivity.value if sensitivity else None
 
 
@@ -191,21 +186,22 @@ def _direction(channel: Channel) -> dict[str, float]:
 
 
 def _response(trace: Trace, channel: Channel) -> Response:
-    """Return the response of a channel, which must have a sensitivity."""
+    """Return the response of a channel, which must have a sensitivity or gains."""
     if not _sensitivity(channel):
         raise RecordRejected(
             trace.id, f"StationXML gives no sensitivity at {trace.stats.starttime}"
         )
-    return channel.response
+    return with_overall_sensitivity(channel.response)
 
 
 def _quantity(trace: Trace, unit: str | None) -> str:
     """Return the quantity that an instrument measures, from the input unit of its response."""
-    if str(unit).upper() not in _QUANTITIES:
+    motion = unit_of_si(unit)
+    if motion is None:
         raise RecordRejected(
             trace.id, f"the instrument measures {unit!r} by its StationXML, not ground motion"
         )
-    return _QUANTITIES[str(unit).upper()]
+    return motion.quantity
 
 
 def _places(trace: Trace, inventory: Inventory | None, channel: Channel | None) -> list[Place]:

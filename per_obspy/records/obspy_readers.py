@@ -62,6 +62,12 @@ _NUMBERS = re.compile(r"\s*+(?:[-+]?[\d.]++(?:[eEdD][-+]?\d++)?[\s,;]*+)++")
 LARGEST_UNPACKED = 512 * 1024**2
 
 
+class _File(BytesIO):
+    """Bytes of a file under its name."""
+
+    name = ""
+
+
 def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
     """
     Call a reader of ObsPy on a file, or on a member of an archive.
@@ -165,7 +171,10 @@ def _called(
             require_whole_numbers(content, str(source))
         if name == "SAC":
             require_coordinates(content, str(source))
-        file = glob.escape(str(source)) if name in _TWO_FILES and beside else BytesIO(content)
+        file = glob.escape(str(source)) if name in _TWO_FILES and beside else _File(content)
+        # The name may end with a direction
+        if isinstance(file, _File):
+            file.name = str(source)
         return reader(file, format=name, check_compression=False, **options)
     except PerError:
         raise

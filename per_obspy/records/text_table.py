@@ -10,11 +10,14 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.formats.text.lines import LONGEST_NUMBER
-from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import (
+    channel_direction,
+    coordinates,
+    horizontal,
+    is_direction,
+    trace,
+)
 from per_obspy.units import motion_unit
-
-#: last letter of a SEED channel code -> orientation
-_LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
 
 #: largest deviation of a time from even spacing, as a fraction of the interval (tables round times)
 _UNEVENNESS = 0.05
@@ -61,7 +64,8 @@ def read_columns(
     channels : mapping of str to int
         Channel code -> column, counted from 0.
     azimuths : mapping of str to float, optional
-        Channel code -> degrees clockwise from north. Codes that end in N, E, Z need none.
+        Channel code -> degrees clockwise from north. Codes of SEED that end in N, E, Z and words
+        as ``UP``, ``L``, ``TRAN`` need none.
     separator : str, optional
         Between columns; white space if not given.
     skip : int
@@ -166,18 +170,20 @@ def _site(latitude: float, longitude: float) -> dict[str, float | None]:
 def _directions(
     channels: Mapping[str, int], azimuths: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
-    """Return the orientation of every channel, from its azimuth or the last letter of its code."""
+    """Return the orientation of every channel, from its azimuth or its code."""
     if not channels:
         raise ValueError("channels must name at least one column")
     if unknown := set(azimuths) - set(channels):
         raise ValueError(f"azimuths must belong to channels, got {sorted(unknown)}")
-    if unclear := [code for code in channels if code not in azimuths and code[-1:] not in _LETTERS]:
+    # An azimuth comes before the code
+    directions = {code: channel_direction(code) for code in channels}
+    directions |= {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
+    if unclear := [code for code, known in directions.items() if not is_direction(known)]:
         raise ValueError(
-            f"azimuths must contain the direction of {unclear}, whose codes do not end in N, E or Z"
+            f"azimuths must contain the direction of {unclear}: expected codes of SEED that end in "
+            f"N, E or Z, or words as NS, UP, L, TRAN"
         )
-    # An azimuth comes before the letter
-    given = {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
-    return {code: given.get(code) or _LETTERS[code[-1]] for code in channels}
+    return directions
 
 
 def _rows(path: str | Path, separator: str | None, skip: int, layout: str | None) -> list[_Row]:

@@ -289,6 +289,10 @@ FLAGS: dict[str, str] = {
     "per_far_above_sd": "PER/SD above the configured limit: a gap from PER is far too large",
     "far_station": "the station is further away than the configured distance for this flag",
     "one_horizontal": "the station has one horizontal: its azimuth is used whatever the pair's",
+    "unknown_azimuths": (
+        "the azimuths of the station's horizontals are unknown: the demand is the largest of all, "
+        "and its azimuth is from the first sensor"
+    ),
     "derived_inputs": "the row has derived inputs, named in the column derived",
     "derived_period": (
         "a period was derived: the demand is at least SRSS; state and rank follow from resampling"

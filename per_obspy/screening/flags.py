@@ -10,6 +10,7 @@ from per_obspy.config import Screening
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.columns import FLAGS, RECORD_FLAGS
 from per_obspy.screening.values import Table, both, number, values
+from per_obspy.spectra.station import lacks_azimuths
 
 #: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it
 #: under-predicts by more than 1 % in up to 43 % of the cases at small gaps, equal masses,
@@ -63,6 +64,7 @@ def raised_by_record(
         "record_from_other_site_class": np.asarray(table["other_site_class"], dtype=bool),
         "far_station": values(table, "distance") > screening.flag_distance,
         "one_horizontal": every & (station.sizes["horizontal"] == 1),
+        "unknown_azimuths": every & lacks_azimuths(station),
         "linearized_not_converged": ~np.asarray(table["linearized_converged"], dtype=bool),
         # A measure is missing where none within its range suffices
         "no_damping_suffices": np.isnan(values(table, "supplemental_damping")),

@@ -40,6 +40,7 @@ from per_obspy.screening.ranking import KEYS, pounding_state, risk_class
 from per_obspy.screening.uncertainty.exact_demand import record_population
 from per_obspy.screening.uncertainty.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
+from per_obspy.spectra.station import lacks_azimuths
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
 #: a reader must know of them.
@@ -127,6 +128,10 @@ def _rows_at_stations(
 def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
     """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
     station = station_motion(dataset)
+    given = pairs
+    # No azimuth of a pair is one of sensors that point nobody knows where
+    if lacks_azimuths(dataset):
+        pairs = pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
     # demand, by groups of pairs whose azimuth is found alike
     parts = []
     for rows, motion, azimuth_rule in _motions(station, pairs, screening.exact):
@@ -139,7 +144,7 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     raised = raised_by_record(table, dataset, screening)
     table |= record_population(station, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
-    return {name: column for name, column in table.items() if name not in pairs}
+    return {name: column for name, column in table.items() if name not in given}
 
 
 def _motions(

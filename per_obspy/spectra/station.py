@@ -69,7 +69,9 @@ def station_spectra(
         Dimensions ``component`` (``component_name`` has the names horizontal_1, horizontal_2,
         vertical of those that exist), ``azimuth``, ``damping``, ``period``, ``horizontal`` and
         ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one horizontal
-        there are no spectra by azimuth: the station serves its own azimuth only.
+        there are no spectra by azimuth: the station serves its own azimuth only. Of two whose
+        azimuths are not both known, azimuths count from the first sensor, at right angles to the
+        second one, and ``horizontal_azimuth`` is NaN.
 
     Raises
     ------
@@ -147,7 +149,10 @@ def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float
     if len(horizontals) == 1:
         return np.array([horizontals[0].data], dtype=np.float64), azimuths
     first, second = horizontals
-    _check_match(first, second, azimuths)
+    _check_match(first, second)
+    if not np.isfinite(azimuths).all():
+        motion = np.array([first.data, second.data], dtype=np.float64)
+        return motion, [np.nan, np.nan]
     # Sensors close to the same line do not resolve the plane
     try:
         north, east = north_and_east(first.data, second.data, *azimuths)
@@ -156,13 +161,14 @@ def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float
     return np.array([north, east]), [0.0, 90.0]
 
 
-def _check_match(first: Trace, second: Trace, azimuths: list[float]) -> None:
-    """Reject two horizontals of unknown azimuth or of different start, interval or length."""
-    if not np.isfinite(azimuths).all():
-        raise RecordRejected(
-            first.id, f"sensor azimuths of {first.id} and {second.id} are unknown: {azimuths}"
-        )
-    # Both are combined sample by sample
+def lacks_azimuths(station: xr.Dataset) -> bool:
+    """Return whether a station has two horizontals whose azimuths are not both known."""
+    azimuths = station.get("horizontal_azimuth", xr.DataArray([]))
+    return bool(azimuths.size == 2 and azimuths.isnull().any())
+
+
+def _check_match(first: Trace, second: Trace) -> None:
+    """Reject two horizontals of different start, interval or length."""
     for field in ("starttime", "delta", "npts"):
         value, other = first.stats[field], second.stats[field]
         if value != other:

@@ -14,16 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import ArrayLike
+from per_obspy.units import unit_of_si
 
 #: Unit of ``stats.units`` of the package's readers and of processed records.
 ACCELERATION = "m/s2"
 
-#: Times of differentiation from displacement to each output of ``remove_response``.
-OUTPUTS = {"DISP": 0, "VEL": 1, "ACC": 2}
+#: Units of ground motion by the times of differentiation from displacement, with the outputs of
+#: ``remove_response`` that are in them.
+_UNITS = ("m", "m/s", ACCELERATION)
+_OUTPUTS = {"DISP": 0, "VEL": 1, "ACC": 2}
+_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
-#: Steps of ``stats.processing`` that change the unit, with the output of ``remove_response``.
-_STEP = re.compile(r": (remove_response|differentiate|integrate|simulate)\(")
-_OUTPUT = re.compile(r"output='(\w+)'")
+#: Steps in ``stats.processing``, of any version of ObsPy, that change the unit of the samples, with
+#: the output of ``remove_response``.
+_STEP = re.compile(
+    r"\b(remove_response|remove_sensitivity|simulate|differentiate|integrate|normalize|trigger)\("
+)
+
+_OUTPUT = re.compile(r"\boutput\s*=\s*[\"']?(\w+)")
 
 P = ParamSpec("P")
 Result = TypeVar("Result", covariant=True)
@@ -141,8 +149,8 @@ def _samples(name: str, trace: AccelerationTrace, unlike: str = "") -> NDArray[A
     component = str(stats.channel)[-1:]
     if component and component in unlike:
         raise ValueError(f"{name} is the Trace {trace.stats.channel!r}: give north, then east")
-    unit = stats.get("units")
-    if unit == ACCELERATION or (unit is None and _is_acceleration(stats.get("processing", ()))):
+    unit = unit_after_steps(stats)
+    if unit == ACCELERATION:
         return trace.data
     known = "an unknown unit, maybe counts" if unit is None else repr(unit)
     raise ValueError(
@@ -151,22 +159,65 @@ def _samples(name: str, trace: AccelerationTrace, unlike: str = "") -> NDArray[A
     )
 
 
-def _is_acceleration(processing: ArrayLike) -> bool:
-    """Return whether ObsPy's list of steps leads from counts to acceleration in m/s²."""
-    order = None
-    for step in np.atleast_1d(np.asarray(processing, dtype=object)).tolist():
-        name = _STEP.search(str(step))
-        if name is None:
-            continue
-        # Every differentiation is one step from displacement to acceleration
-        if name[1] == "remove_response":
-            output = _OUTPUT.search(str(step))
-            order = OUTPUTS.get(output[1]) if output else None
-        elif name[1] == "simulate" or order is None:
-            order = None
+def unit_after_steps(stats: Any) -> str | None:
+    """
+    Return the unit of the samples of a Trace after the steps that ``stats.processing`` names.
+
+    ObsPy changes neither ``units`` nor ``response`` and ``calib`` when it removes a response,
+    differentiates or integrates. A unit without a ``quantity`` is the user's, and is right.
+
+    Parameters
+    ----------
+    stats : obspy Stats
+        Header of a Trace.
+
+    Returns
+    -------
+    str or None
+        ``stats.units`` where no step changes them, None where there are none; ``unknown after
+        STEP`` where the unit is lost.
+
+    Examples
+    --------
+    >>> steps = ["ObsPy 1.4.0: remove_response(output='VEL')", "ObsPy 1.4.0: differentiate()"]
+    >>> unit_after_steps({"processing": steps}), unit_after_steps({"processing": steps[:1] * 2})
+    ('m/s2', 'unknown after remove_response')
+    """
+    unit = stats.get("units")
+    steps = _unit_steps(stats.get("processing", ()))
+    is_physical, quantity = unit not in (None, "counts"), _ORDERS.get(stats.get("quantity"))
+    if not steps or (is_physical and quantity is None):
+        return None if unit is None else str(unit)
+    # Times of differentiation from displacement; None for counts
+    order, is_removed = quantity if is_physical else None, False
+    for step, line in steps:
+        if step in ("differentiate", "integrate") and order is not None:
+            order += 1 if step == "differentiate" else -1
+        elif step.startswith("remove") and not is_removed:
+            order, is_removed = _removed_to(step, line, stats), True
         else:
-            order += 1 if name[1] == "differentiate" else -1
-    return order == OUTPUTS["ACC"]
+            order = None
+        # Beyond acceleration and displacement, or twice removed
+        if order not in _ORDERS.values():
+            return f"unknown after {step}"
+    return None if order is None else _UNITS[order]
+
+
+def _unit_steps(processing: ArrayLike) -> list[tuple[str, str]]:
+    """Return the steps that change the unit, each with its line."""
+    lines = map(str, np.atleast_1d(np.asarray(processing, dtype=object)).tolist())
+    return [(found[1], line) for line in lines if (found := _STEP.search(line))]
+
+
+def _removed_to(step: str, line: str, stats: Any) -> int | None:
+    """Return the order of the samples after removal of response or sensitivity, None if unknown."""
+    output = _OUTPUT.search(line)
+    if step == "remove_response" and (output is None or output[1] != "DEF"):
+        return _OUTPUTS.get(output[1]) if output else None
+    # In the unit of the response, if it is still there
+    sensitivity = getattr(stats.get("response"), "instrument_sensitivity", None)
+    unit = unit_of_si(getattr(sensitivity, "input_units", ""))
+    return _UNITS.index(unit.name) if unit else None
 
 
 def _require_same_times(north: AccelerationTrace, east: AccelerationTrace) -> None:

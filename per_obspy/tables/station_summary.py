@@ -13,6 +13,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.flags import record_flags
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.spectra.station import lacks_azimuths
 from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv, write_described
 
@@ -186,6 +187,8 @@ def _row(station: xr.Dataset, pairs: Mapping[str, int]) -> dict[str, Any]:
     flags = record_flags(station)
     if station.attrs["horizontals"] == 1:
         flags.append(ONE_HORIZONTAL)
+    if lacks_azimuths(station):
+        flags.append("unknown_azimuths")
     return {
         "station": name,
         "state": "used" if np.isfinite(place["longitude"]) else "rejected",

@@ -14,7 +14,11 @@ from obspy.core.inventory.response import (
 
 from per_obspy.errors import RecordRejected
 from per_obspy.processing import instrument_response
-from per_obspy.processing.instrument_response import LONGEST_PAD, in_acceleration
+from per_obspy.processing.instrument_response import (
+    LONGEST_PAD,
+    as_recorded,
+    in_acceleration,
+)
 
 GAIN, RATE = 2e5, 100.0
 TOLERANCE = 0.1  # between gains and sensitivity
@@ -156,3 +160,181 @@ def test_an_hour_of_zeros_behind_a_long_record_is_enough(monkeypatch):
     expected = in_acceleration(stream, TOLERANCE)[0].data
     # The tail of the pre-filter after an hour, which is 18 of its longest periods
     assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def recorded_counts(**stats):
+    """Return whole counts of noise that shakes for some seconds, with a response, ObsPy's way."""
+    noise = np.convolve(np.random.default_rng(4).normal(size=4000), np.hanning(11) / 2, "same")
+    samples = GAIN * noise * np.hanning(4000)
+    stream = counts(np.round(samples).astype(np.int32), response=response(), **stats)
+    del stream[0].stats.units
+    return stream
+
+
+def motion_of(stream):
+    return in_acceleration(Stream([as_recorded(trace) for trace in stream]), TOLERANCE)[0].data
+
+
+STEPS = {
+    "remove_response": {"output": "ACC", "pre_filt": (0.05, 0.1, 40, 45), "water_level": None},
+    "remove_sensitivity": {},
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_what_obspy_converted_is_not_converted_again(step):
+    # mutation: the response that ObsPy leaves in the header divides once more
+    stream = recorded_counts().detrend("demean")
+    getattr(stream, step)(**STEPS[step])
+    # in counts beforehand: 2e5 of them are 1 m/s2
+    assert 1 < np.abs(stream[0].data).max() < 10
+    assert_array_equal(motion_of(stream), stream[0].data)
+
+
+@pytest.mark.parametrize(
+    ("version", "separator"), [("ObsPy 0.10.2", ","), ("ObsPy 1.6.0.dev0+12", "::"), ("", ", ")]
+)
+def test_steps_of_any_version_of_obspy_are_read(version, separator):
+    text = f"{version}: remove_response(inventory=None{separator}output='ACC'{separator}plot=False)"
+    acceleration, _ = motion()
+    stream = counts(acceleration, response=response(), processing=[text])
+    assert_array_equal(motion_of(stream), acceleration)
+
+
+def test_velocity_that_is_differentiated_is_acceleration():
+    stream = recorded_counts().detrend("demean")
+    stream.remove_response(output="VEL", pre_filt=(0.05, 0.1, 40, 45), water_level=None)
+    with pytest.raises(RecordRejected, match=r"units 'm/s', needs .* output='ACC', or diff"):
+        motion_of(stream)
+    stream.differentiate()
+    assert_array_equal(motion_of(stream), stream[0].data)
+
+
+@pytest.mark.parametrize(
+    ("steps", "unit"),
+    [
+        ([("remove_response", {"output": "DISP"})], "units 'm'"),
+        ([("remove_response", {"output": "ACC"}), ("integrate", {})], "units 'm/s'"),
+        ([("remove_response", {"output": "ACC"})] * 2, "unknown after remove_response"),
+        ([("remove_sensitivity", {}), ("normalize", {})], "unknown after normalize"),
+        ([("integrate", {})], "unknown after integrate"),
+        ([("simulate", {"paz_remove": {"poles": [], "zeros": [], "gain": 1.0,
+                                       "sensitivity": 1.0}})], "unknown after simulate"),
+    ],
+)  # fmt: skip
+def test_samples_of_another_unit_are_refused_by_the_step(steps, unit):
+    stream = recorded_counts().detrend("demean")
+    for step, options in steps:
+        getattr(stream, step)(**options)
+    with pytest.raises(RecordRejected, match=unit):
+        motion_of(stream)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+@pytest.mark.parametrize("change", ["demean", "linear", None])
+def test_samples_without_their_steps_are_known_by_the_factor_of_whole_counts(kind, change):
+    # As a file of MiniSEED or SAC has them: no list of steps
+    stream = recorded_counts()
+    stream.remove_sensitivity()
+    trace = stream[0]
+    if change:
+        trace.detrend(change)
+    trace.data = trace.data.astype(kind)
+    del trace.stats.processing
+    assert_array_equal(motion_of(stream), trace.data)
+    # and counts remain counts, whole or without mean and trend
+    raw = recorded_counts().detrend(change or "demean")
+    raw[0].data = raw[0].data.astype(kind)
+    assert_allclose(np.abs(motion_of(raw)).max(), np.abs(raw[0].data).max() / GAIN, rtol=1e-3)
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0, 1 / 9.80665])
+@pytest.mark.parametrize("quantity", ["ACC", "VEL"])
+def test_samples_that_are_no_counts_are_refused_where_their_unit_is_lost(unit, quantity):
+    # m/s2, gal or g of a file; mutation: divided again they are 1e-5 m/s2
+    stream = recorded_counts().detrend("demean")
+    stream.remove_response(output=quantity, pre_filt=(0.05, 0.1, 40, 45), water_level=None)
+    stream[0].data = stream[0].data * unit
+    del stream[0].stats.processing
+    with pytest.raises(RecordRejected, match="samples: no whole numbers up to"):
+        motion_of(stream)
+
+
+def test_filtered_counts_and_fractions_of_counts_remain_counts():
+    # the overall sensitivity is a multiple of 20
+    for stream in (
+        recorded_counts().filter("bandpass", freqmin=0.1, freqmax=30),
+        recorded_counts(),
+    ):
+        stream[0].data = stream[0].data / 20
+        expected = np.abs(stream[0].data).max() / GAIN
+        # the window leaves 1e-4 of the noise above the 40 Hz of the pre-filter
+        assert_allclose(np.abs(motion_of(stream)).max(), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("with_response", [False, True])
+def test_a_calibration_that_is_applied_is_not_applied_again(with_response):
+    # mutation: calib stays in the header and multiplies once more, or the response divides
+    record = obspy.read("/path/to/test.knet")
+    expected = record[0].data * record[0].stats.calib
+    applied = obspy.read("/path/to/test.knet", apply_calib=True)
+    if with_response:
+        applied[0].stats.response = response()
+    assert_allclose(motion_of(applied), expected, rtol=1e-12)
+    # where the header's peak is cut off, whole counts show it
+    half = applied.copy()
+    half.trim(endtime=half[0].stats.starttime + 20)
+    assert_allclose(motion_of(half), half[0].data, rtol=1e-12)
+    # gal, by the header's peak
+    applied[0].data = 100 * applied[0].data
+    with pytest.raises(RecordRejected, match=r"needs counts, or stats\.units"):
+        motion_of(applied)
+
+
+def test_a_unit_that_the_user_sets_is_right():
+    acceleration, _ = motion()
+    stream = counts(acceleration, response=response(), units="m/s2")
+    assert_array_equal(motion_of(stream), acceleration)
+
+
+@pytest.mark.parametrize("stages", [(GAIN,), (GAIN / 8, 8.0), (2.0, GAIN, 0.5)])
+def test_without_an_overall_sensitivity_the_product_of_the_stages_converts(stages):
+    acceleration, _ = motion()
+    silent = response(stages=stages)
+    silent.instrument_sensitivity = None
+    out = in_acceleration(counts(GAIN * acceleration, response=silent), TOLERANCE)[0]
+    # the pre-filter starts at 40 Hz, far above the pulse: rounding of the transform remains
+    assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
+    # gains alone
+    gains = Response(None, None, None, [ResponseStage(1, GAIN, 1.0, "M/S**2", "COUNTS")])
+    out = in_acceleration(counts(GAIN * acceleration, response=gains), TOLERANCE)[0]
+    assert_allclose(out.data, acceleration, rtol=1e-14)
+
+
+def test_a_flat_accelerometer_in_metres_per_second_is_one_of_acceleration():
+    # mutation: its record is differentiated, 2 pi f times too large
+    acceleration, _ = motion()
+    wrong = response()
+    wrong.instrument_sensitivity.input_units = wrong.response_stages[0].input_units = "M/S"
+    out = in_acceleration(counts(GAIN * acceleration, response=wrong), TOLERANCE)[0]
+    assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
+    assert "taken as M/S**2" in out.stats.per_obspy.warnings
+
+
+def test_an_accelerometer_that_is_described_by_velocity_is_differentiated_with_a_warning():
+    # a zero at the origin makes a flat accelerometer one to velocity
+    acceleration, velocity = motion()
+    by_velocity = response("M/S")
+    by_velocity.response_stages[0].zeros = [0j]
+    by_velocity.response_stages[0].poles = []
+    by_velocity.response_stages[0].normalization_factor = 1 / (2 * np.pi)
+    # counts of acceleration: GAIN at 1 Hz to velocity is GAIN / (2 pi) to acceleration
+    out = in_acceleration(
+        counts(GAIN / (2 * np.pi) * acceleration, response=by_velocity), TOLERANCE
+    )[0]
+    # the pre-filter of velocity sensors takes what is below 0.01 Hz
+    assert_allclose(out.data, acceleration, atol=2e-3 * acceleration.max())
+    assert "code N is an accelerometer" in out.stats.per_obspy.warnings
+    assert "warnings" not in in_acceleration(
+        counts(GAIN * velocity, response=response("M/S"), channel="HHE"), TOLERANCE
+    )[0].stats.get("per_obspy", {})

@@ -2,17 +2,21 @@
 
 import errno
 import os
+import re
 import socket
 from pathlib import Path
 
 import numpy as np
 import obspy
 import pytest
-from obspy import Stream
+from obspy import Stream, Trace
 from obspy.core.event import Catalog, Event, Origin
 from station_files import START, read_all, record, write_records
 
+from per_obspy.config import Processing
 from per_obspy.errors import CatalogError, NothingUsable
+from per_obspy.formats.peer_at2 import write_at2
+from per_obspy.processing.chain import process_station
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import find_stations, read_station
 
@@ -344,3 +348,73 @@ def test_a_wrong_line_of_station_text_costs_no_other_line(folder: Path):
     assert rejection.reasons[0] == "line 2: latitude: 'nan', expected a number from -90 to 90"
     # an elevation is read by ObsPy alone
     assert rejection.reasons[1].startswith("line 4: ObsPy cannot read it: ")
+
+
+#: Names of three files, their last titles, and the channels of two horizontals and a vertical.
+DIRECTIONS = [
+    (("1", "2", "3"), ("HNE", "HNN", "HNZ"), ("HNE", "HNN", "HNZ")),
+    (("1", "2", "3"), ("HN1", "HN2", "HNZ"), ("HN1", "HN2", "HNZ")),
+    (("1", "2", "3"), ("L", "T", "V"), ("HNL", "HNT", "HNZ")),
+    (("1", "2", "3"), ("TRAN", "LONG", "UP"), ("HNT", "HNL", "HNZ")),
+    (("X-L", "X-T", "X-UP"), ("", "", ""), ("HNL", "HNT", "HNZ")),
+    (("XHNE", "XHNN", "XHNZ"), ("", "", ""), ("HNE", "HNN", "HNZ")),
+]
+
+
+def write_components(folder: Path, names: tuple[str, ...], titles: tuple[str, ...]) -> None:
+    """Write files of AT2 with peaks of 3, 2 and 1 m/s2, whose titles end with a direction."""
+    for seed, (name, title) in enumerate(zip(names, titles, strict=True)):
+        samples = np.random.default_rng(seed).normal(size=3000)
+        trace = Trace(samples * (3 - seed) / np.abs(samples).max(), {"delta": 0.01})
+        trace.stats.update({"units": "m/s2", "channel": title, "station": "PLACE"})
+        write_at2(Stream([trace]), folder / f"{name}.AT2")
+
+
+@pytest.mark.parametrize(("names", "titles", "channels"), DIRECTIONS)
+def test_every_component_of_a_set_of_files_has_its_identity(
+    tmp_path: Path, names: tuple[str, ...], titles: tuple[str, ...], channels: tuple[str, ...]
+):
+    # mutation: all share one code, and the vertical, or the last file, becomes the horizontal
+    write_components(tmp_path, names, titles)
+    contents = find_stations(tmp_path)
+    [(station, paths)] = contents.stations.items()
+    best, rejected = process_station(read_station(paths, None, station)[0], Processing())
+    assert rejected == ()
+    # seven digits of the file
+    peaks = {trace.stats.channel: np.abs(trace.data).max() for trace in best}
+    assert peaks == pytest.approx(dict(zip(channels, (3, 2, 1), strict=True)), rel=1e-6)
+
+
+@pytest.mark.parametrize("titles", [("FOO", "BAR", "BAZ"), ("1", "2", "3"), ("L", "L", "L")])
+def test_components_that_cannot_be_told_apart_are_refused(tmp_path: Path, titles: tuple[str, ...]):
+    write_components(tmp_path, ("a1", "a2", "a3"), titles)
+    contents = find_stations(tmp_path)
+    [(station, paths)] = contents.stations.items()
+    best, rejected = process_station(read_station(paths, None, station)[0], Processing())
+    assert not best
+    reasons = " ".join(row.reasons[0] for row in rejected)
+    assert re.search("cannot be told apart|it may be that|contradict each other", reasons)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("name", "peaks"),
+    [
+        # mended or refused by name, as the README of each expects; m/s2 to four digits
+        ("three-contradicting-pieces", {"HNN": 5.166, "HNZ": 3.639}),
+        ("at2-unknown-direction", {"BNE": 8.661, "BNN": 3.627, "BNZ": 2.260}),
+        ("at2-longitudinal-transverse", {"HNL": 8.181, "HNT": 6.175, "HNZ": 3.324}),
+        ("mseed-rate-rounding", {"HNE": 3.205, "HNN": 5.166, "HNZ": 3.639}),
+        ("stationxml-no-overall-sensitivity", {"HNE": 3.205, "HNN": 5.166, "HNZ": 3.639}),
+    ],
+)
+def test_inputs_that_gave_wrong_numbers_in_the_field(
+    real_data: Path, name: str, peaks: dict[str, float]
+):
+    contents = find_stations(real_data / "field" / name)
+    [(station, paths)] = contents.stations.items()
+    stream, _ = read_station(paths, contents.inventory, station)
+    best, rejected = process_station(stream, Processing())
+    found = {trace.stats.channel: float(np.abs(trace.data).max()) for trace in best}
+    assert found == pytest.approx(peaks, rel=2e-4)
+    assert len(rejected) == 3 - len(peaks)

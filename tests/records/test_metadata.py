@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from obspy import UTCDateTime
 from obspy.core.inventory import Comment, Inventory, Response
+from obspy.core.inventory.response import PolesZerosResponseStage, ResponseStage
 from station_files import (
     THREE,
     inventory,
@@ -98,6 +99,24 @@ def test_stationxml_that_contradicts_itself_is_a_reason(folder: Path):
 def test_the_same_stationxml_twice_is_no_contradiction(folder: Path):
     write_inventory(inventory(THREE), folder, "other.xml")
     assert len(read_all(folder)[0]) == 3
+
+
+def test_the_product_of_the_stages_stands_for_a_sensitivity_that_stationxml_leaves_out(
+    folder: Path,
+):
+    # mutation: all records of the station are rejected, although every stage has a gain
+    silent = response()
+    laplace = "LAPLACE (RADIANS/SECOND)"
+    sensor = PolesZerosResponseStage(1, 500.0, 1.0, "M/S**2", "V", laplace, 1.0, [], [], 1.0)
+    silent.response_stages = [sensor, ResponseStage(2, 400.0, 1.0, "V", "COUNTS")]
+    silent.instrument_sensitivity = None
+    write_inventory(inventory(THREE, answer=silent), folder)
+    traces, reasons = read_all(folder)
+    assert reasons == ()
+    for trace in traces:
+        sensitivity = trace.stats.response.instrument_sensitivity
+        assert (sensitivity.value, sensitivity.input_units) == (2e5, "M/S**2")
+        assert trace.stats.quantity == "acceleration"
 
 
 @pytest.mark.parametrize(

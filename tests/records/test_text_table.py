@@ -44,6 +44,14 @@ def test_columns_become_channels_in_metres_per_second_squared(table: Path):
     assert [trace.stats.sensor_dip for trace in stream] == [0, 0, -90]
 
 
+def test_words_of_directions_are_no_letters(table: Path):
+    # mutation: the last letter alone makes TRAN a north, DOWN a north, TRANSVERSE an east component
+    words = {"TRAN": 1, "L": 2, "DOWN": 3}
+    stream = read_columns(table, **LAYOUT | {"channels": words})
+    assert not any("sensor_azimuth" in trace.stats for trace in stream)
+    assert [trace.stats.sensor_dip for trace in stream] == [0, 0, 90]
+
+
 @pytest.mark.parametrize("units", ["m/s2", "cm/s2", "gal", "g", "m/s^2", "cm/sec/sec", "Gal"])
 def test_all_units_of_one_motion_agree(tmp_path: Path, units: str):
     in_unit = {"m": 9.80665, "c": 980.665, "gal": 980.665, "g": 1.0}[
@@ -115,7 +123,7 @@ def test_faults_of_the_file_name_line_and_channel(table: Path, old: str, new: st
         ({"time_column": None, "dt": -1.0}, "dt must be positive, got -1"),
         ({"latitude": 91}, "latitude must be between -90 and 90, got 91"),
         ({"channels": {}}, "channels must name at least one column"),
-        ({"channels": {"HN1": 1}}, r"azimuths must contain the direction of \['HN1'\]"),
+        ({"channels": {"HN3": 1}}, r"azimuths must contain the direction of \['HN3'\]"),
         ({"layout": "packed"}, "layout must be one of columns, rows, got 'packed'"),
         ({"layout": "rows"}, "layout = rows needs dt and no time_column, got column 0"),
         (

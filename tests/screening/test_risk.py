@@ -165,6 +165,22 @@ def test_one_horizontal_serves_with_a_flag_and_without_the_exact_rung():
     assert table["flags"].str.contains("one_horizontal").all()
 
 
+def test_sensors_of_unknown_azimuth_serve_with_the_largest_demand_whatever_the_pair():
+    # mutation: the azimuth of the pair, counted from the first sensor, gives a smaller demand
+    station = make_station()
+    unknown = station.assign(horizontal_azimuth=("horizontal", [np.nan, np.nan]))
+    table, worst = (
+        _table(unknown, {}, {"azimuth": 30.0}),
+        _table(station, *[{"azimuth": np.nan}] * 2),
+    )
+    for name in ("demand", "probability", "demand_exact"):
+        assert_allclose(table[name], worst[name], rtol=1e-12)  # the same computation
+    assert table.loc["P1", "azimuth"] == 30.0
+    assert set(table["azimuth_rule"]) == {"worst"}
+    assert table["flags"].str.contains("unknown_azimuths").all()
+    assert not worst["flags"].str.contains("unknown_azimuths").any()
+
+
 def test_the_nearest_station_is_used_and_far_pairs_are_rejected():
     stations = [make_station("NEAR", latitude=10.01), make_station("FAR", latitude=11.0, seed=9)]
     pairs = make_pairs([{}, {"latitude_1": 13.0, "latitude_2": 13.0}])

@@ -91,6 +91,17 @@ def test_sensors_of_any_azimuth_give_the_same_motion(station, azimuths):
     assert_allclose(turned["per_rotd100"], station["per_rotd100"], rtol=2e-6)
 
 
+@pytest.mark.parametrize("codes", [("HN1", "HN2"), ("HNL", "HNT"), ("HNX", "HNE")])
+def test_percentiles_over_azimuths_need_no_north(station, codes):
+    # Motion over all azimuths is the same in whichever frame of the horizontal plane
+    stream = Stream([_trace(code, samples) for code, samples in zip(codes, MOTION, strict=False)])
+    unknown = per_obspy.station_spectra(stream, PERIODS, (0.05, 0.2))
+    assert np.isnan(unknown["horizontal_azimuth"]).all()
+    assert_allclose(unknown["per_rotd100"], station["per_rotd100"], rtol=2e-6)  # float32
+    assert_allclose(unknown["per_rotd50"], station["per_rotd50"], rtol=2e-6)
+    assert unknown["pga"].size == 2
+
+
 def test_one_horizontal_serves_its_own_azimuth_only():
     station = per_obspy.station_spectra(_stream((30.0,)), PERIODS)
     assert "per_azimuthal" not in station
@@ -137,7 +148,6 @@ def test_the_stream_is_left_as_it_was():
         (_stream((0.0, 45.0, 90.0)), "has 3 horizontal"),
         (_stream(units="counts"), "XX.ONE..HN1 is in 'counts', not m/s2"),
         (_stream((20.0, 30.0)), "too close to the same line"),
-        (Stream([_trace("HN1", MOTION[0]), _trace("HN2", MOTION[1])]), "azimuths .* are unknown"),
         (
             Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1][:-1])]),
             "npts is 1200, but 1199",

@@ -154,9 +154,11 @@ def known(value: float, factor: float = 1.0) -> float | None:
 
 
 def channel_name(header: Header, dt: float) -> str:
-    """Return the SEED channel code; channels of unknown orientation are numbered as in the file."""
+    """Return the SEED channel code; channels without an azimuth are numbered as in the file."""
     code = channel_code(1 / dt, header.words)
-    return code if len(code) == 3 else f"{code}{header.channel % 10}"
+    return (
+        f"{code[:2]}{header.channel % 10}" if len(code) < 3 or "direction" in header.words else code
+    )
 
 
 def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:

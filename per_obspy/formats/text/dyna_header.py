@@ -16,7 +16,7 @@ from per_obspy.formats.text.fields import (
     text_field,
 )
 from per_obspy.formats.text.lines import DECIMAL, Text, free_block, refuse
-from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import channel_direction, coordinates, trace
 from per_obspy.units import MotionUnit, motion_unit
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_/^]*:")
@@ -26,9 +26,6 @@ _START = "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS"
 
 #: words for an unknown ground, in lower case
 _UNKNOWN = ("", "none", "unknown", "null", "nan", "-")
-
-#: last letter of the channel code -> orientation
-_DIRECTIONS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
 
 
 def read_dyna_text(text: Text, first: int) -> Stream:
@@ -42,10 +39,12 @@ def read_dyna_text(text: Text, first: int) -> Stream:
     # Words of the header
     words = _station(text, fields) | {"units": unit.name, "quantity": unit.quantity}
     words["event"] = _event(text, fields)
-    words |= _processing(text, fields) | _orientation(fields)
+    words |= _processing(text, fields)
+    # The format has no azimuths, only the channel
+    words |= channel_direction(text_field(fields, "STREAM") or "")
     words["starttime"] = _moment(text, fields, _START, text_field(fields, _START) or "")
     words["header_peak"] = _peak(text, fields, unit.name)
-    return Stream([trace(values, dt, words)])
+    return Stream([trace(values, dt, words, text.name)])
 
 
 def _header_end(text: Text, first: int) -> int:
@@ -124,12 +123,6 @@ def _instrument(text: Text, fields: Fields) -> dict[str, Any]:
         "natural_frequency": number_field(text, fields, "INSTRUMENTAL_FREQUENCY_HZ"),
         "damping": number_field(text, fields, "INSTRUMENTAL_DAMPING"),
     }
-
-
-def _orientation(fields: Fields) -> dict[str, float]:
-    """Return the direction that the channel code has; the format names no azimuth."""
-    channel = text_field(fields, "STREAM") or " "
-    return _DIRECTIONS.get(channel[-1], {})
 
 
 def _processing(text: Text, fields: Fields) -> dict[str, Any]:

@@ -22,7 +22,7 @@ _REQUIRED = ("network", "station", "latitude", "longitude")
 _LARGEST = {"latitude": 90.0, "longitude": 180.0}
 
 #: A decimal number; ``float`` also reads ``1_0`` and ``nan``.
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][+-]?+\d++)?+", re.ASCII)
 
 #: start of an epoch that FDSN station text leaves open
 _OPEN = UTCDateTime(1, 1, 2)

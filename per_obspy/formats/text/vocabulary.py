@@ -22,6 +22,8 @@ sensor_location
     Place in the structure or the ground, as the header has it.
 sensor_azimuth, sensor_dip
     Degrees clockwise from north (horizontals only); degrees down from horizontal (0; up is -90).
+direction
+    Direction in the words of the file, where these give no azimuth: ``L``, ``TRAN``, ``HN1``.
 corners
     highpass, lowpass: corners of the filter that was applied, Hz.
 instrument
@@ -54,22 +56,7 @@ from obspy import Trace
 from obspy.core import AttribDict
 
 from per_obspy.checks import FloatArray
-
-#: words for a vertical sensor -> its dip, degrees down from horizontal
-VERTICAL_DIPS = {
-    **dict.fromkeys(
-        ("UP", "UPDO", "U", "Z", "V", "VER", "VERT", "VERTICAL", "UD", "U-D", "VRT", "VRTC"), -90.0
-    ),
-    **dict.fromkeys(("DOWN", "DWN", "DN", "-UP", "D"), 90.0),
-}
-
-#: words for the points of the compass -> degrees clockwise from north
-COMPASS_AZIMUTHS = {
-    **dict.fromkeys(("N", "NS", "N-S", "SN", "NORTH"), 0.0),
-    **dict.fromkeys(("E", "EW", "E-W", "WE", "EAST"), 90.0),
-    **dict.fromkeys(("S", "SOUTH"), 180.0),
-    **dict.fromkeys(("W", "WEST"), 270.0),
-}
+from per_obspy.constants import COMPASS_AZIMUTHS, HORIZONTAL_LETTERS, SEED_CODE, VERTICAL_DIPS
 
 #: words that can name a file
 _CODES = ("network", "station", "location", "channel")
@@ -84,6 +71,16 @@ _QUADRANT_AZIMUTHS = {
 _QUADRANT = re.compile(r"([NS])\s*+(\d{1,2}(?:\.\d*)?)\s*+([EW])")
 _DEGREES = re.compile(r"\d{1,3}(\.\d*)?")
 
+#: numbers of components; last letters of SEED codes of horizontals; azimuths and last letters of
+#: SEED codes in names of files
+_NUMBERS = ("1", "2", "3")
+_HORIZONTAL_CODES = tuple("NE12LTRHXY")
+_FILE_AZIMUTH = re.compile(r"000|0[1-9]\d|[12]\d\d|3[0-5]\d|360")
+_FILE_NUMBER = re.compile(r"(H|HOR|[A-Z][GHLMN])[12]")
+_FILE_CODES = tuple("NEZ12")
+#: words before a direction
+_COMPONENT = re.compile(r"COMP(ONENT)?\b[\s.:]*+")
+
 #: smallest sampling rate, Hz -> band code of SEED
 _BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
 
@@ -91,18 +88,23 @@ _BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
 _AXIS_TOLERANCE = 5
 
 
-def orientation(words: str) -> dict[str, float]:
+def orientation(words: str) -> dict[str, Any]:
     """
-    Return ``sensor_azimuth`` or ``sensor_dip`` from words as ``N21E``, ``NS``, ``UP``.
+    Return ``sensor_azimuth``, ``sensor_dip``, ``direction`` of ``N21E``, ``NS``, ``UP``, ``LONG``.
 
-    Words that name no direction give an empty mapping.
+    A word without an azimuth is the ``direction``; an unknown or numbered one has no dip either, as
+    it may be that of the vertical. No word gives an empty mapping. A single 1, 2 or 3 is a number,
+    not an azimuth.
 
-    >>> orientation("S 16 E")
-    {'sensor_azimuth': 164.0, 'sensor_dip': 0.0}
-    >>> orientation("Up"), orientation("270 DEG")
-    ({'sensor_dip': -90.0}, {'sensor_azimuth': 270.0, 'sensor_dip': 0.0})
+    >>> orientation("S 16 E"), orientation("270 DEG")
+    ({'sensor_azimuth': 164.0, 'sensor_dip': 0.0}, {'sensor_azimuth': 270.0, 'sensor_dip': 0.0})
+    >>> orientation("Up"), orientation("HNZ")
+    ({'sensor_dip': -90.0}, {'sensor_dip': -90.0})
+    >>> orientation("Tran"), orientation("Othr")
+    ({'direction': 'TRAN', 'sensor_dip': 0.0}, {'direction': 'OTHR'})
     """
-    word = words.strip().upper().removesuffix("DEG").rstrip(" .")
+    text = _COMPONENT.sub("", words.strip().upper())
+    word = text.removesuffix("DEG").rstrip(" .")
     # Vertical sensors and points of the compass
     if word in VERTICAL_DIPS:
         return {"sensor_dip": VERTICAL_DIPS[word]}
@@ -113,9 +115,73 @@ def orientation(words: str) -> dict[str, float]:
         start, sign = _QUADRANT_AZIMUTHS[quadrant[1] + quadrant[3]]
         return horizontal(start + sign * float(quadrant[2]))
     # A full azimuth in degrees
-    if _DEGREES.fullmatch(word) and float(word) <= 360:
+    if _DEGREES.fullmatch(word) and float(word) <= 360 and text not in _NUMBERS:
         return horizontal(float(word))
-    return {}
+    return _without_azimuth(re.sub(r"[^A-Z0-9]+", "", word))
+
+
+def _without_azimuth(word: str) -> dict[str, Any]:
+    """Return the direction of a word that has no azimuth."""
+    if not word:
+        return {}
+    letter = _letter(word)
+    if letter == "Z":
+        return {"sensor_dip": -90.0}
+    # U, V and W may be three inclined sensors; 1, 2, 3 and A, B, C any direction
+    is_numbered = letter in _NUMBERS and (word in _NUMBERS or word not in HORIZONTAL_LETTERS)
+    is_horizontal = not is_numbered and letter in _HORIZONTAL_CODES
+    return {"direction": word} | ({"sensor_dip": 0.0} if is_horizontal else {})
+
+
+def is_direction(words: Mapping[str, Any]) -> bool:
+    """Return whether an orientation is a vertical, or a horizontal such as HN1 and HN2."""
+    return "sensor_dip" in words or _letter(str(words.get("direction", ""))) in ("1", "2")
+
+
+def _letter(word: str) -> str:
+    """Return the last letter of a channel code for a word without an azimuth; empty if unknown."""
+    known = word if word in HORIZONTAL_LETTERS else word.rstrip("0123456789")
+    if known in HORIZONTAL_LETTERS:
+        return HORIZONTAL_LETTERS[known]
+    return word[-1] if re.fullmatch(SEED_CODE, word) or word in _NUMBERS else ""
+
+
+def channel_direction(code: str) -> dict[str, Any]:
+    """
+    Return the direction of a channel code, of which N and E are azimuths as well.
+
+    >>> channel_direction("HNE"), channel_direction("TRAN")
+    ({'sensor_azimuth': 90.0, 'sensor_dip': 0.0}, {'direction': 'TRAN', 'sensor_dip': 0.0})
+    """
+    if re.fullmatch(SEED_CODE, code) and code not in HORIZONTAL_LETTERS and code[-1] in "NE":
+        return horizontal(COMPASS_AZIMUTHS[code[-1]])
+    return orientation(code)
+
+
+def file_direction(name: str) -> dict[str, Any]:
+    """
+    Return the direction at the end of a file's name, for headers that have none.
+
+    It is the suffix, the whole name, or follows ``-``, ``_``, ``.`` or a blank; a code of SEED may
+    follow letters. Numbers must be azimuths of three digits from 010 on, or 000, and no whole
+    names: files are numbered as well.
+
+    >>> file_direction("OLD--L.AT2"), file_direction("HILLHNZ.AT2"), file_direction("CBGS.ver")
+    ({'direction': 'L', 'sensor_dip': 0.0}, {'sensor_dip': -90.0}, {'sensor_dip': -90.0})
+    >>> file_direction("ELC_180.AT2"), file_direction("record_003.at2")
+    ({'sensor_azimuth': 180.0, 'sensor_dip': 0.0}, {})
+    """
+    stem, _, suffix = re.split(r"[/\\]", name)[-1].upper().rpartition(".")
+    words = [suffix if len(suffix) > 1 else "", *re.split(r"[-_. ]+", stem)[-1:]]
+    for word in words:
+        is_azimuth = word != stem and _FILE_AZIMUTH.fullmatch(word)
+        is_numbered = word[-1:].isdigit() and not (is_azimuth or _FILE_NUMBER.fullmatch(word))
+        direction = {} if is_numbered else orientation(word)
+        if is_direction(direction):
+            return direction
+    # Without a separator only a whole code of SEED is no part of a name
+    code = re.search(rf"{SEED_CODE}$", stem)
+    return orientation(code[0]) if code and code[0][-1] in _FILE_CODES else {}
 
 
 def horizontal(azimuth: float) -> dict[str, float]:
@@ -123,23 +189,24 @@ def horizontal(azimuth: float) -> dict[str, float]:
     return {"sensor_azimuth": azimuth % 360, "sensor_dip": 0.0}
 
 
-def channel_code(sampling_rate: float, orientation: Mapping[str, float]) -> str:
+def channel_code(sampling_rate: float, orientation: Mapping[str, Any]) -> str:
     """
     Return the SEED code of an accelerometer's channel.
 
     North and east within 5 degrees are N and E; otherwise 1 is the horizontal nearer to the
-    north-south line. An unknown orientation gives only band and instrument.
+    north-south line. Without an azimuth it is the letter of the component: N, E, L, T, 1. An
+    unknown orientation gives only band and instrument.
 
     >>> channel_code(200, horizontal(0)), channel_code(50, horizontal(118))
     ('HNN', 'BN2')
-    >>> channel_code(100, {"sensor_dip": -90})
-    'HNZ'
+    >>> channel_code(100, {"sensor_dip": -90}), channel_code(100, {"direction": "TRAN"})
+    ('HNZ', 'HNT')
     """
     band = next(code for rate, code in _BANDS if round(sampling_rate, 3) >= rate)
     if abs(orientation.get("sensor_dip", 0.0)) == 90:
         return f"{band}NZ"
     if "sensor_azimuth" not in orientation:
-        return f"{band}N"
+        return f"{band}N{_letter(orientation.get('direction', ''))}"
     return f"{band}N{_horizontal_letter(orientation['sensor_azimuth'])}"
 
 
@@ -155,7 +222,7 @@ def _horizontal_letter(azimuth: float) -> str:
     return "1" if from_southeast < 90 else "2"
 
 
-def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
+def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = "") -> Trace:
     """
     Return a trace with the words of the vocabulary.
 
@@ -171,6 +238,8 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
         Sampling interval, s.
     words : mapping
         From the header.
+    file : str, optional
+        Name of a file of one component, whose end may be a direction.
     """
     known = {}
     words = _with_notes(words)
@@ -178,6 +247,9 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
         group = _without_unknowns(word)
         if group is not None and group != AttribDict():
             known[name] = group
+    # The name of the file helps where the header names no direction
+    if "sensor_dip" not in known and "channel" not in known:
+        known |= file_direction(file)
     known.setdefault("channel", channel_code(1 / dt, known))
     # Strip the characters that a file name cannot hold
     for name in _CODES:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from per_obspy.formats.text.vocabulary import (
     channel_code,
     coordinates,
+    file_direction,
     horizontal,
     orientation,
     trace,
@@ -70,12 +71,63 @@ def test_vertical_directions(words: str, dip: float):
     assert orientation(words) == {"sensor_dip": dip}
 
 
-@pytest.mark.parametrize(
-    "words",
-    ["", "H1", "L", "Long", "Tran", "Radial", "361", "N100E", "N E", "Other", "9999", "-20"],
-)
-def test_unknown_directions_are_absent(words: str):
+@pytest.mark.parametrize("words", ["", " ", "-", "?"])
+def test_no_word_is_no_direction(words: str):
     assert orientation(words) == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "letter"),
+    [
+        *[(words, "L") for words in ("L", "Long", "LONGITUDINAL", "HNL")],
+        *[(words, "T") for words in ("T", "Tran", "TRANSVERSE", "HGT")],
+        *[(words, "L") for words in ("Comp. L", "L1")],
+        *[(words, "1") for words in ("H1", "Hor 1", "FN")],
+        *[("Radial", "R"), ("HNE", "E"), ("HLN", "N"), ("X", "X"), ("Y", "Y")],
+    ],
+)
+def test_horizontals_without_an_azimuth_keep_their_word(words: str, letter: str):
+    # mutation: 1 is an azimuth of one degree, Tran ends with the N of north
+    direction = orientation(words)
+    assert "sensor_azimuth" not in direction
+    assert direction["sensor_dip"] == 0.0
+    assert channel_code(100, direction) == f"HN{letter}"
+
+
+@pytest.mark.parametrize(
+    ("words", "letter"),
+    [
+        *[(words, "") for words in ("361", "N100E", "N E", "Other", "9999", "-20")],
+        *[("HN3", "3"), ("HNA", "A"), ("1", "1"), ("HN2", "2")],
+    ],
+)
+def test_unknown_and_numbered_directions_have_no_dip(words: str, letter: str):
+    # each may be the vertical, 1 and 2 beside a 3
+    direction = orientation(words)
+    assert set(direction) == {"direction"}
+    assert channel_code(100, direction) == f"HN{letter}"
+
+
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [
+        ("OLD--L.AT2", {"direction": "L", "sensor_dip": 0.0}),
+        ("a/b.zip/RSN99_HILLHNE.AT2", {"direction": "HNE", "sensor_dip": 0.0}),
+        ("x_UP.AT2", {"sensor_dip": -90.0}),
+        ("kobe.000", horizontal(0)),
+        ("E.AT2", horizontal(90)),
+        ("x_h2.AT2", {"direction": "H2", "sensor_dip": 0.0}),
+        ("kobe.ver", {"sensor_dip": -90.0}),
+        ("ELC-270.at2", horizontal(270)),
+        # numbers of files, names of stations, of which the last letters are no direction
+        *[
+            (name, {})
+            for name in ("001.AT2", "rec_007.AT2", "HOTEL.AT2", "090.AT2", "IRPINIA.V2", "a.d")
+        ],
+    ],
+)
+def test_names_of_files_may_end_with_a_direction(name: str, direction: dict[str, object]):
+    assert file_direction(name) == direction
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,13 @@ import pytest
 from numpy.testing import assert_array_equal
 from obspy import Stream, Trace, UTCDateTime
 
-from per_obspy.processing.station.components import instruments, is_horizontal, oriented, paired
+from per_obspy.processing.station.components import (
+    instruments,
+    is_horizontal,
+    oriented,
+    paired,
+    told_apart,
+)
 
 OVERLAP = 0.8  # of the longer horizontal
 
@@ -41,6 +47,12 @@ def test_inputs_stay_unchanged():
         ("090", 90.0, True),
         ("360", 0.0, True),
         ("H1", None, True),
+        ("L", None, True),
+        ("TRAN", None, True),
+        ("VERT", None, False),
+        ("Up", None, False),
+        ("north", 0.0, True),
+        ("HHW", None, True),
     ],
 )
 def test_the_code_gives_the_direction_without_metadata(channel, azimuth, horizontal):
@@ -126,3 +138,80 @@ def test_extra_components_are_reasons():
     assert len(accepted) == 3
     reasons = " ".join(row.reasons[0] for row in rejected)
     assert reasons.count("a third horizontal") == reasons.count("a second vertical") == 1
+
+
+@pytest.mark.parametrize(
+    ("codes", "refused"),
+    [
+        (("HNE", "HNN", "HNZ"), ()),
+        (("HN1", "HN2", "HNZ"), ()),
+        (("HN1", "HN2"), ()),
+        (("L", "T", "UP"), ()),
+        (("HN",), ()),
+        (("A", "B", "UP"), ()),
+        # any of them may be the vertical
+        (("HN1", "HN2", "HN3"), ("HN1", "HN2", "HN3")),
+        (("0", "1", "2"), ("0", "1", "2")),
+        (("CH1", "CH2", "CH3"), ("CH1", "CH2", "CH3")),
+        (("HHU", "HHV", "HHW"), ("HHU", "HHV", "HHW")),
+        (("A", "B", "C"), ("A", "B", "C")),
+        (("N", "A"), ("A",)),
+    ],
+)
+def test_what_may_be_the_vertical_is_refused_by_its_name(codes, refused):
+    # mutation: the first two codes by name are the horizontals
+    stream = Stream([trace(code) for code in codes])
+    [instrument] = instruments(stream)
+    apart, rejected = told_apart(instrument)
+    assert {part.stats.channel for part in apart} == set(codes) - set(refused)
+    assert {row.name.rsplit(".", 1)[1] for row in rejected} == set(refused)
+    assert all("it may be that" in row.reasons[0] for row in rejected)
+
+
+def test_metadata_tell_numbers_apart():
+    dips = {"HN1": 0.0, "HN2": 0.0, "HN3": -90.0}
+    stream = Stream([trace(code, sensor_dip=dip) for code, dip in dips.items()])
+    assert told_apart(stream)[1] == ()
+
+
+def test_two_directions_of_one_identity_are_refused_by_both_names():
+    stream = Stream([trace("HN", direction=word) for word in ("FOO", "BAR")] + [trace("HNZ")])
+    apart, rejected = told_apart(stream)
+    assert [part.stats.channel for part in apart] == ["HNZ"]
+    assert all("'BAR', 'FOO' cannot be told apart" in row.reasons[0] for row in rejected)
+
+
+@pytest.mark.parametrize("codes", [("H1", "H2", "UP"), ("1", "2", "V"), ("L", "T", "UD")])
+def test_numbers_of_components_are_no_instruments(codes):
+    # mutation: the number at the end makes H1 and H2 two instruments, of which one is lost
+    assert len(instruments(Stream([trace(code) for code in codes]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("rates", "kept"),
+    [
+        ({"HNE": 100, "HNN": 50, "HNZ": 100}, ["HNE", "HNZ"]),
+        ({"HNE": 50, "HNN": 100, "HNZ": 100}, ["HNN", "HNZ"]),
+        ({"HNE": 100, "HNN": 100, "HNZ": 50}, ["HNE", "HNN"]),
+        ({"HNE": 100, "HNN": 200, "HNZ": 100}, ["HNE", "HNZ"]),
+        ({"HNE": 99.9999, "HNN": 50, "HNZ": 100}, ["HNE", "HNZ"]),
+        ({"HNE": 99.9999, "HNN": 100, "HNZ": 100}, ["HNE", "HNN", "HNZ"]),
+        # none can say which one is right
+        ({"HNE": 100, "HNN": 50}, []),
+        ({"HNE": 100, "HNN": 50, "HNZ": 200}, []),
+    ],
+)
+def test_a_rate_that_the_other_components_do_not_share_is_wrong(rates, kept):
+    # mutation: half the rate makes the record the longest one, which goes first
+    stream = Stream([trace(code, sampling_rate=float(rate)) for code, rate in rates.items()])
+    accepted, rejected = paired(oriented(stream), OVERLAP)
+    assert [part.stats.channel for part in accepted] == kept
+    assert len(rejected) == len(rates) - len(kept)
+    assert all("rate is wrong" in row.reasons[0] for row in rejected)
+
+
+def test_components_of_another_rate_over_the_same_time_are_not_wrong():
+    stream = Stream([trace("HNE"), trace("HNZ"), trace("HNN", 500, sampling_rate=50.0)])
+    accepted, rejected = paired(oriented(stream), OVERLAP)
+    assert [part.stats.channel for part in accepted] == ["HNE", "HNZ"]
+    assert "sampled every 0.02 s, its partner" in rejected[0].reasons[0]

@@ -303,6 +303,10 @@ SPANISH: dict[str, str] = {
     "flag_one_horizontal": (
         "la estación tiene una horizontal: se usa su azimut, cualquiera que sea el del par"
     ),
+    "flag_unknown_azimuths": (
+        "los azimuts de las horizontales de la estación son desconocidos: la demanda es la mayor "
+        "de todos, y su azimut se mide desde el primer sensor"
+    ),
     "flag_derived_inputs": "la fila tiene datos derivados, nombrados en la columna derived",
     "flag_derived_period": (
         "un período es derivado: la demanda es al menos SRSS; estado y rango vienen de remuestreo"
@@ -357,6 +361,7 @@ SPANISH: dict[str, str] = {
     "flagname_per_far_above_sd": "PER muy sobre SD",
     "flagname_far_station": "estación lejana",
     "flagname_one_horizontal": "una horizontal",
+    "flagname_unknown_azimuths": "azimuts desconocidos",
     "flagname_derived_inputs": "datos derivados",
     "flagname_derived_period": "período derivado",
     "flagname_linearized_not_converged": "linealización sin convergencia",
