@@ -308,6 +308,7 @@ def peak_sentence(
     earthquake : Earthquake
         As for :func:`peak_deviations`.
     """
+    # From neighbours, or from the model
     name, unit = MEASURES[measure]
     expected, count = found.expected[station], found.neighbours[station]
     source = f"Boore and others 2014 for magnitude {earthquake.magnitude:g}"
@@ -315,7 +316,9 @@ def peak_sentence(
         source = f"median of {count} neighbours within {found.reach[station] / 1000:.0f} km"
     # Ratios below 1 are read more easily as fractions
     ratio = peak / expected
-    times = f"{ratio:.3g} times as much" if ratio > 1 else f"1/{1 / ratio:.3g} of it"
+    size = max(ratio, 1 / ratio)
+    written = f"{size:.0f}" if 100 <= size < 1e6 else f"{size:.2g}"
+    times = f"{written} times as much" if ratio > 1 else f"1/{written} of that"
     sentence = (
         f"{name} {peak:.3g} {unit}, expected {expected:.3g} {unit} ({source}): {times}, "
         f"{abs(found.deviations[station]):.1f} deviations"

@@ -148,6 +148,7 @@ def _misread(
     peaks: Peaks, placed: NDArray[np.bool_], earthquake: Earthquake
 ) -> dict[int, Comparison]:
     """Return what is said of placed stations far away whose coordinates read otherwise are near."""
+    # Stations have a middle, few of them have that of the earthquake
     east, north = peaks.longitude, peaks.latitude
     middle, typical = _middle(east[placed], north[placed], earthquake)
     has_middle = int(np.count_nonzero(placed)) >= PLACED
