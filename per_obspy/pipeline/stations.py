@@ -257,6 +257,9 @@ def _source(earthquakes: Sequence[Mapping[str, Any]], spectra: Sequence[xr.Datas
     for name in Earthquake._fields:
         values[name] = facts.get(name) if facts.get(name) is not None else values.get(name, np.nan)
     source = Earthquake(**{name: float(value) for name, value in values.items()})
+    # A simulated earthquake owes nothing to a model of real ones
+    if any(station.attrs.get("simulated") == "true" for station in spectra):
+        source = source._replace(magnitude=np.nan)
     return source if np.isfinite(source.latitude) else source._replace(longitude=np.nan)
 
 

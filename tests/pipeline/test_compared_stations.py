@@ -128,7 +128,7 @@ def test_rejected_stations_are_rows_with_the_way_to_lift_them(finished):
     rejected = pd.read_csv(finished.folder / "rejected.csv").set_index("name")["reasons"]
     for name, part in {
         LARGE: "as by a wrong unit (cm/s2 taken for g)",
-        LOST_SIGN: "km (a lost sign)",
+        LOST_SIGN: "km from it, as by a lost sign",
         EMPTY: "coordinates 0, 0 are an empty field",
     }.items():
         assert part in rejected[name]

@@ -196,10 +196,11 @@ def _other_reading(
         distance = float(great_circle(*middle, east, north))
         if abs(north) > 90.0 or distance > near:
             continue
-        words = ["exchanged"] if exchanged else []
+        words = ["an exchange"] if exchanged else []
         words += ["a lost sign"] if min(sign, other_sign) < 0 else []
         # As a user would write it
-        return f"{north:.4f}, {east:.4f} would be {distance / 1000:.0f} km ({' and '.join(words)})"
+        there = f"{north:.4f}, {east:.4f} would be {distance / 1000:.0f} km from it"
+        return f"{there}, as by {' and '.join(words)}"
     return ""
 
 
