@@ -139,10 +139,9 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
     longitude, latitude = np.array(places).reshape(-1, 2).T
     names = np.array([file.name for file in files.stations], dtype=object)
     classes = np.array([file.site_class for file in files.stations], dtype=object)
-    shards = [(file.shard, file.hash, file.flags) for file in files.stations]
     # Stations and the map stay in memory from one chunk to the next
     stations = Stations(
-        names, longitude, latitude, classes, lambda index: read_station_once(*shards[index])
+        names, longitude, latitude, classes, lambda index: _flagged_station(files.stations[index])
     )
     shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
     return RegionalMotion(stations, files.field, shakemap)
@@ -156,13 +155,18 @@ def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
 
 
 @lru_cache(STATIONS_KEPT)
-def read_station_once(shard: Path, digest: str, flags: str = "") -> xr.Dataset:
-    """Read a station file, cached by its hash; flags of the comparison with others join it."""
+def read_station_once(shard: Path, digest: str) -> xr.Dataset:
+    """Read a station file, cached by its hash."""
     content = shard.read_bytes()
     # Its pairs are not at fault, and the next run makes the station file again
     if bytes_hash(content) != digest:
         raise MachineFault(f"{shard}: changed while the run read it")
-    station = read_spectra(shard, content)
-    if flags and flags != str(station["record_flags"].item()):
-        station["record_flags"] = station["record_flags"].copy(data=flags)
-    return station
+    return read_spectra(shard, content)
+
+
+def _flagged_station(file: StationFile) -> xr.Dataset:
+    """Read a station with the flags of the comparison with others, which its file does not have."""
+    station = read_station_once(file.shard, file.hash)
+    if not file.flags or file.flags == str(station["record_flags"].item()):
+        return station
+    return station.assign(record_flags=station["record_flags"].copy(data=file.flags))
