@@ -58,6 +58,9 @@ WARNINGS = {
     "digitised": "digitised from film",
     "undated": "without a date",
     "contradicting_coordinates": "with contradicting coordinates",
+    "implausible_amplitude": "with an implausible amplitude",
+    "implausible_place": "in an implausible place",
+    "repeated_record": "with the record of another",
     "record_warning": "with other warnings",
     "one_horizontal": "with one horizontal",
     "unknown_azimuths": "with horizontals of unknown azimuth",
@@ -295,6 +298,7 @@ def print_result(result: "Result") -> None:
         print("Up to date: these inputs were run before.")
     _print_counts(record)
     _print_warnings(record.get("warnings", {}))
+    _print_trusted(record.get("trusted", {}))
     # Agreement with observed pounding, worst pairs, files
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
@@ -333,6 +337,14 @@ def _print_warnings(warnings: dict[str, list[str]]) -> None:
             texts.append(f"{len(stations)}{noun} {meaning} ({names}{more})")
     if texts:
         print(f"warnings: {', '.join(texts)}; see stations.csv")
+
+
+def _print_trusted(trusted: dict[str, list[str]]) -> None:
+    """Print which stations are used because they are trusted, and trusted names without records."""
+    if kept := trusted.get("kept"):
+        print(f"used although implausible (records.trust): {', '.join(kept)}")
+    if unknown := trusted.get("unknown"):
+        print(f"records.trust: no records of {', '.join(unknown)}")
 
 
 def _simulated_line(counts: dict[str, int]) -> str:

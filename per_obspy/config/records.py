@@ -328,6 +328,13 @@ class Records(Section):
             "read"
         ),
     )
+    trust: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]*\.[A-Za-z0-9_-]+$")], ...] = Field(
+        (),
+        description=(
+            "stations (NET.STA) that serve their pairs although their peaks or places are "
+            "implausible next to the other stations; they keep their flags"
+        ),
+    )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")

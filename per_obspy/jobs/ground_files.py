@@ -42,6 +42,8 @@ class StationFile(NamedTuple):
         Its Dataset.
     hash : str
         Of the station file.
+    flags : str
+        Of its record, those of the comparison with other stations included.
     """
 
     name: str
@@ -50,6 +52,7 @@ class StationFile(NamedTuple):
     site_class: str
     shard: Path
     hash: str
+    flags: str
 
 
 class GroundFiles(NamedTuple):
@@ -110,7 +113,7 @@ def ground_files(
     hypocentre = hypocentre_of([dataset.attrs for dataset in spectra])
     field = prepared_field(spectra, settings, hypocentre) if spectra else None
     # Everything that decides the motion at a pair
-    contents = [(file.name, file.hash) for file in files]
+    contents = [(file.name, file.hash, file.flags) for file in files]
     known = [*contents, *map(file_hash, shakemap), hypocentre]
     key = bytes_hash(repr(known).encode())
     return GroundFiles(tuple(files), field, shakemap, key), tuple(rejected)
@@ -125,7 +128,9 @@ def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
         spectra[key].item() for key in ("station", "longitude", "latitude")
     )
     site_class = site_class_of(spectra)
-    return StationFile(name, longitude, latitude, site_class, shard, station.hash), spectra
+    flags = str(spectra["record_flags"].item()) if "record_flags" in spectra else ""
+    file = StationFile(name, longitude, latitude, site_class, shard, station.hash, flags)
+    return file, spectra
 
 
 def read_ground(files: GroundFiles) -> RegionalMotion:
@@ -134,10 +139,9 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
     longitude, latitude = np.array(places).reshape(-1, 2).T
     names = np.array([file.name for file in files.stations], dtype=object)
     classes = np.array([file.site_class for file in files.stations], dtype=object)
-    shards = [(file.shard, file.hash) for file in files.stations]
     # Stations and the map stay in memory from one chunk to the next
     stations = Stations(
-        names, longitude, latitude, classes, lambda index: read_station_once(*shards[index])
+        names, longitude, latitude, classes, lambda index: _flagged_station(files.stations[index])
     )
     shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
     return RegionalMotion(stations, files.field, shakemap)
@@ -158,3 +162,11 @@ def read_station_once(shard: Path, digest: str) -> xr.Dataset:
     if bytes_hash(content) != digest:
         raise MachineFault(f"{shard}: changed while the run read it")
     return read_spectra(shard, content)
+
+
+def _flagged_station(file: StationFile) -> xr.Dataset:
+    """Read a station with the flags of the comparison with others, which its file does not have."""
+    station = read_station_once(file.shard, file.hash)
+    if not file.flags or file.flags == str(station["record_flags"].item()):
+        return station
+    return station.assign(record_flags=station["record_flags"].copy(data=file.flags))

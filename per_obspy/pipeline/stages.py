@@ -41,6 +41,7 @@ from per_obspy.pipeline.screening import Screened, screened
 from per_obspy.pipeline.stations import (
     FoundStations,
     all_rejections,
+    compared_stations,
     find_station_jobs,
     finished_stations,
     simulated_motion,
@@ -95,10 +96,11 @@ def new_run(
 def new_screening(asked: RunSettings, executor: Executor | None, progress: Progress) -> Result:
     """Screen the pairs with the stations of the latest run, whose output folder is locked."""
     settings, folder = asked.settings, asked.folder
-    stations = _earlier_stations(settings, folder)
+    found = _earlier_stations(settings, folder)
     drawn = write_drawn_pairs(settings, folder, progress)
     check_inputs(settings, folder)
     earthquakes, known = earlier_facts(folder / RECORD)
+    stations, trusted = compared_stations(found, earthquakes, settings.records)
     earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
     started = now()
     # A later run does everything that has changed since, whatever is recorded here
@@ -109,6 +111,7 @@ def new_screening(asked: RunSettings, executor: Executor | None, progress: Progr
     with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
         record = _later_stages(settings, folder, stations, rejected, used, progress)
     record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
+    record["trusted"] = trusted
     _add_stations(record, known)
     return _finished_record(settings, folder, record, head, earlier_rows)
 
@@ -116,8 +119,9 @@ def new_screening(asked: RunSettings, executor: Executor | None, progress: Progr
 def new_report(asked: RunSettings, record: dict[str, Any], progress: Progress) -> Result:
     """Write the report of a finished run with this record again; its output folder is locked."""
     settings, folder = asked.settings, asked.folder
-    stations = _usable(_earlier_stations(settings, folder))
-    made = reported(settings, folder, stations, progress)
+    earlier = _earlier_stations(settings, folder)
+    stations, _ = compared_stations(earlier, record.get("earthquakes", ()), settings.records)
+    made = reported(settings, folder, _usable(stations), progress)
     outputs = record["outputs"] | file_hashes(folder, made.outputs)
     # A picture or layer that failed is made by the next run
     key = "" if made.faults else record["key"]
@@ -153,14 +157,16 @@ def _all_stages(
         noted = noted_engine(folder / RECORD, used)
         with timed(seconds, "stations"), compiling(progress), noted:
             progress("stations", 0, len(found.jobs))
-            stations = finished_stations(found.jobs, settings.workers, used, progress)
+            done = finished_stations(found.jobs, settings.workers, used, progress)
+        # Only now every station has its neighbours
+        stations, trusted = compared_stations(done, found.earthquakes, settings.records)
         _begun(folder, settings, SCREENING, found.earthquakes, facts)
         # From here on no record is needed
         rejected = all_rejections(found.rejected, stations)
         record = _later_stages(settings, folder, stations, rejected, used, progress)
-    record["earthquakes"] = found.earthquakes
+    record |= {"earthquakes": found.earthquakes, "trusted": trusted}
     _add_stations(record, found.known)
-    record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
+    record["intermediate"] = _intermediate_hashes(folder, done, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}
 
 

@@ -5,7 +5,10 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
 
 from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spectra, load
 from per_obspy.errors import CatalogError, Rejection, WriteError
@@ -21,6 +24,9 @@ from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
+from per_obspy.screening.ground_motion.amplitudes import Earthquake
+from per_obspy.screening.ground_motion.site_motion import hypocentre_of
+from per_obspy.screening.ground_motion.station_comparison import Comparison, compare_stations
 from per_obspy.threads import usable_processors
 
 #: Stations that a message names.
@@ -174,6 +180,112 @@ def finished_stations(
         reason = f"{error.reason}; {_waiting_stations(sorted(waiting))}"
         raise WriteError(error.path, reason) from error
     return sorted(finished, key=lambda station: station.station)
+
+
+class ComparedStations(NamedTuple):
+    """
+    Stations after the comparison with each other.
+
+    Attributes
+    ----------
+    stations : list of FinishedStation
+        All of them: with the flags and warnings of the comparison, or rejected by it.
+    trusted : dict
+        ``kept``: trusted stations that the comparison would have rejected; ``plausible``: those
+        that it would not; ``unknown``: trusted names of which there is no record.
+    """
+
+    stations: list[FinishedStation]
+    trusted: dict[str, list[str]]
+
+
+def compared_stations(
+    stations: Sequence[FinishedStation],
+    earthquakes: Sequence[Mapping[str, Any]],
+    records: Records | None,
+) -> ComparedStations:
+    """
+    Compare all finished stations with each other and the earthquake; their files stay as they are.
+
+    Parameters
+    ----------
+    stations : sequence of FinishedStation
+        Those of the run, usable or not.
+    earthquakes : sequence of mapping
+        Facts of the earthquakes of the records, see ``with_event``; the screened one counts.
+    records : Records or None
+        Settings, with the names of trusted stations.
+    """
+    # Peaks, places and shapes of the motion
+    trust = records.trust if records else ()
+    spectra = [station.spectra for station in stations if station.spectra is not None]
+    said = compare_stations(spectra, _source(earthquakes, spectra))
+    compared, kept = list[FinishedStation](), list[str]()
+    for station in stations:
+        comparison = said.get(_name_of(station), Comparison())
+        if comparison.rejected and _name_of(station) not in trust:
+            compared.append(_rejected(station, comparison.rejected))
+            continue
+        kept += [_name_of(station)] if comparison.rejected else []
+        compared.append(_flagged(station, comparison))
+    # Trusted names, by what trust has changed
+    names = {_name_of(station) for station in stations}
+    return ComparedStations(
+        compared,
+        {
+            "kept": sorted(kept),
+            "plausible": sorted({*trust} & names - {*kept}),
+            "unknown": sorted({*trust} - names),
+        },
+    )
+
+
+def _name_of(station: FinishedStation) -> str:
+    """Return the name of a station; that of a file stem lacks the dot of a missing network."""
+    if station.spectra is not None:
+        return str(station.spectra["station"].item())
+    return station.station if "." in station.station else f".{station.station}"
+
+
+def _source(earthquakes: Sequence[Mapping[str, Any]], spectra: Sequence[xr.Dataset]) -> Earthquake:
+    """Return the screened earthquake by event or headers, with its place by the stations."""
+    screened = next((one for one in earthquakes if one.get("screened")), {})
+    facts = screened.get("event") or screened.get("headers") or {}
+    place = hypocentre_of([station.attrs for station in spectra])
+    values = {} if place is None else place._asdict()
+    # A fact that is missing or None is unknown
+    for name in Earthquake._fields:
+        values[name] = facts.get(name) if facts.get(name) is not None else values.get(name, np.nan)
+    source = Earthquake(**{name: float(value) for name, value in values.items()})
+    # A simulated earthquake owes nothing to a model of real ones
+    if any(station.attrs.get("simulated") == "true" for station in spectra):
+        source = source._replace(magnitude=np.nan)
+    return source if np.isfinite(source.latitude) else source._replace(longitude=np.nan)
+
+
+def _rejected(station: FinishedStation, reasons: Sequence[str]) -> FinishedStation:
+    """Return a station that the comparison with the others rejects, with the way to keep it."""
+    assert station.spectra is not None  # nothing is said of others
+    name = _name_of(station)
+    source = str(station.spectra["source_files"].item())
+    lift = f'if it is right: records.trust = ["{name}"]'
+    row = Rejection("station", name, source, None, (*reasons, lift))
+    rejected = (*station.rejected, row)
+    return station._replace(shard=None, hash="", spectra=None, rejected=rejected)
+
+
+def _flagged(station: FinishedStation, comparison: Comparison) -> FinishedStation:
+    """Return a station with the flags and warnings of the comparison with the others."""
+    if station.spectra is None or not comparison.flags:
+        return station
+    # Beside those of the processing
+    changed = station.spectra.copy()
+    flags = {*str(changed["record_flags"].item()).split(), *comparison.flags}
+    earlier = str(changed["warnings"].item())
+    texts = [earlier, *comparison.warnings] if earlier else comparison.warnings
+    for name, text in (("record_flags", " ".join(sorted(flags))), ("warnings", "; ".join(texts))):
+        changed[name] = changed[name].copy(data=text)
+    return station._replace(spectra=changed)
 
 
 def simulated_stations(stations: Sequence[FinishedStation]) -> int:

@@ -270,6 +270,9 @@ RECORD_FLAGS = (
     "digitised",
     "undated",
     "contradicting_coordinates",
+    "implausible_amplitude",
+    "implausible_place",
+    "repeated_record",
     "record_warning",
 )
 
@@ -339,6 +342,16 @@ FLAGS: dict[str, str] = {
     ),
     "contradicting_coordinates": (
         "two sources place the station more than 1 km apart: see stations.csv"
+    ),
+    "implausible_amplitude": (
+        "the station's peaks differ from its neighbours or from a ground-motion model by more than "
+        "4 deviations: see stations.csv"
+    ),
+    "implausible_place": (
+        "the station's coordinates are an empty field, exchanged, or lack a sign: see stations.csv"
+    ),
+    "repeated_record": (
+        "the station's record is that of another station, perhaps times a factor: see stations.csv"
     ),
     "record_warning": (
         "the station's record failed another check that only warns: see stations.csv"

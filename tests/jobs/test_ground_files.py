@@ -121,3 +121,18 @@ def test_stations_of_two_earthquakes_have_no_common_hypocentre(stations):
     for degrees, station in enumerate(stations[:2]):
         station.spectra.attrs |= dict.fromkeys(HYPOCENTRE, float(degrees))
     assert ground_files(stations, (), Interpolation())[0].key == unknown
+
+
+def test_flags_of_a_comparison_reach_the_pairs_and_decide_the_key(stations):
+    # would catch: pairs of a finished chunk without a flag that another station has brought
+    plain = ground_files(stations, (), Interpolation())[0]
+    changed = stations[0].spectra.copy()
+    changed["record_flags"] = changed["record_flags"].copy(data="implausible_amplitude")
+    flagged = [stations[0]._replace(spectra=changed), *stations[1:]]
+    ground = ground_files(flagged, (), Interpolation())[0]
+    assert ground.key != plain.key
+    first, second = (read_ground(ground).stations.read(index) for index in (0, 1))
+    assert first["record_flags"].item() == "implausible_amplitude"
+    assert second["record_flags"].item() == ""
+    # the file is as it was
+    assert read_spectra(stations[0].shard)["record_flags"].item() == ""

@@ -182,18 +182,22 @@ def _onset(
         group = [trace for trace in stream if is_horizontal(trace) == (direction == "horizontal")]
         return picks.setdefault(direction, _picked_times(group))
 
-    onset, method = first_wave(picked, computed, tolerance)
+    end = max((trace.stats.endtime for trace in stream), default=UTCDateTime(0))
+    onset, method = first_wave(picked, computed, tolerance, end)
     # With its causes, from which an update of the event is judged
     if source is not None and computed is not None and onset is not None:
         place = stream[0].stats.coordinates
         known = {name: list(map(_ns, times)) for name, times in picks.items()}
         where = [float(place.latitude), float(place.longitude)]
-        source.note(place=where, picks=known, onset=onset.ns, method=method)
+        source.note(place=where, picks=known, end=_ns(end), onset=onset.ns, method=method)
     return onset, method
 
 
 def first_wave(
-    picked: Callable[[str], Sequence[UTCDateTime]], computed: UTCDateTime | None, tolerance: float
+    picked: Callable[[str], Sequence[UTCDateTime]],
+    computed: UTCDateTime | None,
+    tolerance: float,
+    end: UTCDateTime,
 ) -> tuple[UTCDateTime | None, str]:
     """
     Return the time of the first wave, None if there is no clear one, and the method.
@@ -206,11 +210,14 @@ def first_wave(
         P wave by the travel time.
     tolerance : float
         Between a pick and the computed P, s.
+    end : UTCDateTime
+        Of the record. A P wave after it contradicts every pick: the station is in a wrong place, or
+        its clock is wrong, and the picks count.
     """
     # The vertical first: P moves it most
     for direction in DIRECTIONS:
         times = picked(direction)
-        if computed is not None:
+        if computed is not None and computed <= end:
             times = [time for time in times if abs(time - computed) <= tolerance]
         if times:
             middle = median(time.timestamp for time in times)
@@ -242,7 +249,8 @@ def same_onset(decision: Mapping[str, Any], source: Source, tolerance: float) ->
     # The same picks, with the P of the event now
     latitude, longitude = decision["place"]
     computed = _rounded(p_arrival_at(latitude, longitude, source))
-    onset, method = first_wave(picks.__getitem__, computed, tolerance)
+    end = _of_ns(decision["end"])
+    onset, method = first_wave(picks.__getitem__, computed, tolerance, end)
     return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])
 
 
@@ -282,7 +290,8 @@ def trimmed(stream: Stream, before: float, after: float) -> Stream:
         start, end = trace.stats.starttime, trace.stats.endtime
         onset = UTCDateTime(trace.stats.per_obspy.get("onset", start))
         is_longer = start < onset - before or end > onset + after
-        if "onset" in trace.stats.per_obspy and is_longer:
+        is_inside = onset - before < end and onset + after > start
+        if "onset" in trace.stats.per_obspy and is_longer and is_inside:
             trace.trim(onset - before, onset + after)
             trace.data = trace.data.copy()  # a view would hold the whole day
             # The noise is shorter by the time that was cut before it

@@ -55,6 +55,26 @@ def test_the_preferred_origin_and_magnitude_are_used():
     assert source_of(event) == Source(START, 4.0, 5.0, 1e4, 7.0)
 
 
+def test_a_wave_after_the_end_of_the_record_does_not_discard_its_picks(earthquake):
+    # a station in a wrong place, thousands of kilometres away, whose record has a clear onset
+    vertical = component(earthquake(), coordinates=at(80.0))
+    source = Source(START, 0.0, 0.0, 1e4, 6.0)
+    picked = with_window(vertical)[0].stats.per_obspy
+    assert p_arrival(vertical, source) > vertical.stats.endtime
+    far = with_window(vertical, source=source)[0].stats.per_obspy
+    assert (far.noise, far.onset) == (picked.noise, picked.onset)
+    # a P wave within the record does discard it
+    near = component(earthquake(), coordinates=at(0.1))
+    assert with_window(near, source=source)[0].stats.per_obspy.onset != picked.onset
+
+
+def test_a_record_that_ends_before_its_wave_is_not_cut_to_nothing():
+    # would catch: no sample left where the hours of continuous records are cut
+    quiet = component(np.zeros(3000), coordinates=at(80.0))
+    windows = with_window(quiet, source=Source(START, 0.0, 0.0, 1e4, 6.0))
+    assert len(trimmed(windows, 60.0, 300.0)[0]) == 3000
+
+
 def test_noise_ends_before_the_pick_of_the_vertical(earthquake):
     # the horizontal alone would give 24.5 s
     vertical, horizontal = (

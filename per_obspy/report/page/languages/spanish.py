@@ -352,6 +352,17 @@ SPANISH: dict[str, str] = {
         "el registro fue digitalizado de película: períodos cortos y largos menos ciertos"
     ),
     "flag_undated": "se desconoce la hora del registro: puede ser de otro sismo",
+    "flag_implausible_amplitude": (
+        "los picos de la estación difieren más de 4 desviaciones de sus vecinas o de un modelo de "
+        "movimiento del suelo: vea stations.csv"
+    ),
+    "flag_implausible_place": (
+        "las coordenadas de la estación son un campo vacío, están intercambiadas o les falta un "
+        "signo: vea stations.csv"
+    ),
+    "flag_repeated_record": (
+        "el registro de la estación es el de otra, quizá por un factor: vea stations.csv"
+    ),
     "flag_record_warning": ("el registro falló otra revisión que solo advierte: vea stations.csv"),
     "flag_simulated": "el movimiento del suelo es simulado",
     "flagname_unknown_gap": "separación desconocida",
@@ -379,6 +390,9 @@ SPANISH: dict[str, str] = {
     "flagname_assumed_corners": "cortes supuestos",
     "flagname_digitised": "digitalizado",
     "flagname_undated": "sin fecha",
+    "flagname_implausible_amplitude": "amplitud inverosímil",
+    "flagname_implausible_place": "ubicación inverosímil",
+    "flagname_repeated_record": "registro repetido",
     "flagname_record_warning": "advertencia del registro",
     "flagname_simulated": "simulado",
     "kind_file": "archivo",
