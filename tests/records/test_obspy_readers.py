@@ -15,6 +15,7 @@ from obspy.core.util.base import ENTRY_POINTS
 from station_files import record
 
 from per_obspy.errors import RecordRejected
+from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
 from per_obspy.records.contents.metadata_files import read_inventories
 from per_obspy.records.event_file import read_event
@@ -109,10 +110,13 @@ def test_the_payload_is_one(tmp_path: Path):
     assert (tmp_path / "made").exists()
 
 
-def test_allowed_formats_are_all_but_those_that_reach_beyond_their_file():
+def test_allowed_formats_are_recorded_motion_that_does_not_reach_beyond_its_file():
     # a format that a new ObsPy brings is read only once it has been looked at
     left_out = {kind: set(ENTRY_POINTS[kind]) - names for kind, names in FORMATS.items()}
-    assert left_out["waveform"] == {"PICKLE", "CSS", "NNSA_KB_CORE", "GSE1", "GSE2"}
+    unsafe = {"PICKLE", "CSS", "NNSA_KB_CORE", "GSE1", "GSE2"}
+    moon = {"ALSEP_PSE", "ALSEP_WTN", "ALSEP_WTH"}
+    other = {"RG16", "SEG2", "SEGY", "SU", "WAV", "DMX", "CYBERSHAKE", *moon}
+    assert left_out["waveform"] == unsafe | other
     assert left_out["event"] == {"CSZ", "SC3ML"}
     assert left_out["inventory"] == {"SC3ML"}
 
@@ -190,3 +194,62 @@ def test_any_error_is_a_rejection_on_one_line(content: bytes, options: dict, rea
     with pytest.raises(RecordRejected, match=reason) as rejection:
         read_bytes_with_obspy(reader, content, "service", **options)
     assert "\n" not in str(rejection.value)
+
+
+def test_foreign_readers_work_apart_and_read_the_same():
+    # would catch samples, times or headers that change on the way between the processes
+    folder = Path(obspy.__file__).parent / "io"
+    for name, file in {
+        "GCF": "gcf/tests/data/20160603_1910n.gcf",
+        "SLIST": "ascii/tests/data/slist_float.ascii",
+        "WIN": "win/tests/data/25112618_ch0000.24bits",
+    }.items():
+        content = (folder / file).read_bytes()
+        here = obspy.read(io.BytesIO(content), format=name)
+        apart = read_bytes_with_obspy(obspy.read, content, "service")
+        assert apart == here
+    # A recorder's file without its last packet is read with its warning
+    content = (folder / "reftek/tests/data/221935615_00000000").read_bytes()
+    with pytest.warns(UserWarning, match="File might be truncated"):
+        assert read_bytes_with_obspy(obspy.read, content, "service")[0].stats.npts > 0
+    for file in ("dataless.seed.BW_FURT", "RESP.BK.BRIB..BV1"):
+        content = (folder / "xseed/tests/data" / file).read_bytes()
+        here = obspy.read_inventory(io.BytesIO(content))
+        apart = read_bytes_with_obspy(obspy.read_inventory, content, "service")
+        assert apart.get_contents() == here.get_contents()
+        assert apart[0][0][0].response == here[0][0][0].response
+
+
+@pytest.mark.parametrize(
+    ("program", "reason"),
+    [
+        ("while True: pass", "reading it takes more than 1 s of processor time"),
+        ("bytearray(1 << 33)", "reading it takes more than 64 MiB of memory"),
+        ("import os; os.abort()", "reading it takes more than 64 MiB of memory"),
+        ("import os; os._exit(3)", "its reader ends with code 3"),
+    ],
+)
+def test_a_reader_that_fails_loses_its_file_only(tmp_path: Path, monkeypatch, program, reason):
+    # a GCF file whose reader never ends, fills the memory or ends the process
+    gcf = Path(obspy.__file__).parent / "io/gcf/tests/data/20160603_1910n.gcf"
+    (tmp_path / "a.gcf").write_bytes(gcf.read_bytes())
+    record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
+    monkeypatch.setattr(obspy_readers, "_limits", lambda size: Limits(1.0, 64 << 20))
+    call = obspy_readers.read_apart
+    monkeypatch.setattr(obspy_readers, "read_apart", lambda limits, *_: call(limits, exec, program))
+    contents = find_stations(tmp_path)
+    assert list(contents.stations) == ["CI.CLC"]
+    (row,) = contents.rejected
+    assert (row.name, row.reasons) == ("a.gcf", (f"{reason}: damaged, or no GCF file",))
+
+
+@pytest.mark.real_data
+def test_a_file_that_hung_is_a_row_of_the_rejected(tmp_path: Path, real_data: Path):
+    hangs = real_data / "field/record-that-hangs/x.rg16"
+    if not hangs.exists():
+        pytest.skip("no record-that-hangs among the data")
+    (tmp_path / "x.rg16").write_bytes(hangs.read_bytes())
+    record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
+    contents = find_stations(tmp_path)
+    assert list(contents.stations) == ["CI.CLC"]
+    assert [row.name for row in contents.rejected] == ["x.rg16"]
