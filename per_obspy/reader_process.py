@@ -20,14 +20,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-#: Drivers of GDAL that are used.
-DRIVERS = ("GPKG", "GeoJSON", "ESRI Shapefile", "FlatGeobuf", "OSM")
+#: Drivers of GDAL that are used; its own work needs the one of memory.
+DRIVERS = (
+    *("GPKG", "GeoJSON", "GeoJSONSeq", "ESRIJSON", "ESRI Shapefile", "FlatGeobuf", "OSM"),
+    *("MEM", "Memory"),
+)
 
 #: All other drivers of vector data of GDAL 3.4 to 3.13; the process looks for further ones.
 _OTHER_DRIVERS = (
     "PCIDSK,PDS4,VICAR,JP2OpenJPEG,JPEG2000,JP2ECW,JP2KAK,JP2MrSID,PDF,MBTiles,BAG,EEDA,OGCAPI,"
-    "netCDF,HDF5,HDF5Image,GDALG,MapInfo File,UK .NTF,LVBAG,OGR_SDTS,S57,DGN,OGR_VRT,Memory,MEM,"
-    "CSV,NAS,GML,GPX,LIBKML,KML,GeoJSONSeq,ESRIJSON,TopoJSON,Interlis 1,Interlis 2,OGR_GMT,SQLite,"
+    "netCDF,HDF5,HDF5Image,GDALG,MapInfo File,UK .NTF,LVBAG,OGR_SDTS,S57,DGN,OGR_VRT,"
+    "CSV,NAS,GML,GPX,LIBKML,KML,TopoJSON,Interlis 1,Interlis 2,OGR_GMT,SQLite,"
     "OGR_DODS,ODBC,WAsP,PGeo,MSSQLSpatial,OGR_OGDI,PostgreSQL,PostgreSQL/PostGIS,MySQL,OCI,FileGDB,"
     "OpenFileGDB,DWG,DXF,CAD,IDB,GeoRSS,VFK,PGDUMP,GPSBabel,OGR_PDS,WFS,OAPIF,SOSI,EDIGEO,SVG,"
     "Idrisi,ARCGEN,XLS,ODS,XLSX,Elasticsearch,Walk,Carto,AmigoCloud,SXF,Selafin,JML,PLSCENES,CSW,"
@@ -140,7 +143,7 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
         clock.daemon = True
         clock.start()
         try:
-            pickle.dump((limits, function, arguments), process.stdin, protocol=5)
+            pickle.dump((limits, os.getcwd(), function, arguments), process.stdin, protocol=5)
             process.stdin.flush()
             is_value, answer = pickle.load(process.stdout)
             # Memory that was short may not be free again
@@ -178,10 +181,11 @@ def _serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         try:
-            limits, function, arguments = pickle.load(calls)
+            limits, folder, function, arguments = pickle.load(calls)
         except EOFError:
             return
         try:
+            os.chdir(folder)
             _limit(limits)
             answer = (True, function(*arguments))
         except MemoryError as error:

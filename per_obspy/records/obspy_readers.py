@@ -30,7 +30,9 @@ from per_obspy.files import writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
-from per_obspy.records.archives.archive_files import read_file
+from per_obspy.records.archives.archive_files import LIMITS, read_file
+from per_obspy.records.archives.packed import PIECE
+from per_obspy.records.archives.walked import SMALL
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -75,6 +77,9 @@ _TWO_FILES = ("Q",)
 
 #: first bytes of a packed file -> its decompressor
 _UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
+
+#: first bytes of files that other programs packed -> their name
+_OTHER_PACKERS = {b"\xfd7zXZ\x00": "xz", b"\x28\xb5\x2f\xfd": "Zstandard", b"7z\xbc\xaf": "7-Zip"}
 
 #: Largest size of an unpacked file: a day of three components at 200 Hz as text has 400 MB.
 LARGEST_UNPACKED = 512 * 1024**2
@@ -153,16 +158,26 @@ def _unpacked(content: bytes, path: Path) -> bytes:
     unpacker = next(unpackers, None)
     if unpacker is None:
         return content
-    # One byte more than allowed shows that the file is too large
+    # Piece by piece, so that a bomb is refused before it fills the memory
+    unpacked = BytesIO()
     try:
         with unpacker(BytesIO(content)) as file:
-            unpacked: bytes = file.read(LARGEST_UNPACKED + 1)
+            while piece := file.read(PIECE):
+                unpacked.write(piece)
+                _require_size(unpacked.tell(), len(content), path)
     except (OSError, EOFError, zlib.error) as error:
         raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
-    if len(unpacked) > LARGEST_UNPACKED:
+    return unpacked.getvalue()
+
+
+def _require_size(unpacked: int, packed: int, path: Path) -> None:
+    """Refuse a packed file that unpacks to more than the limits, bytes."""
+    if unpacked > LARGEST_UNPACKED:
         problem = f"it unpacks to more than {LARGEST_UNPACKED // 1024**2} MiB: unpack it by hand"
         raise RecordRejected(str(path), problem)
-    return unpacked
+    if unpacked > max(LIMITS.largest_ratio * packed, SMALL):
+        problem = f"it unpacks to more than {LIMITS.largest_ratio:g} times its packed size"
+        raise RecordRejected(str(path), f"{problem}: unpack it by hand")
 
 
 def _called(
@@ -251,6 +266,9 @@ def _unknown(content: bytes) -> str:
     """Return the reason why no format is found; an archive is opened by its name only."""
     if zipfile.is_zipfile(BytesIO(content)) or tarfile.is_tarfile(BytesIO(content)):
         return "it is an archive: its name must end with .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz"
+    for mark, packer in _OTHER_PACKERS.items():
+        if content.startswith(mark):
+            return f"it is packed by {packer}: unpack it first"
     return f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
 
 

@@ -3,8 +3,11 @@
 import bz2
 import gzip
 import io
+import lzma
 import pickle
 import tarfile
+import tracemalloc
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -154,6 +157,29 @@ def test_packed_files_are_read_up_to_a_limit(tmp_path: Path, packer, monkeypatch
         read_with_obspy(obspy.read, path)
 
 
+@pytest.mark.parametrize("packer", [gzip.compress, bz2.compress], ids=["gz", "bz2"])
+def test_a_bomb_is_refused_before_it_fills_the_memory(tmp_path: Path, packer):
+    # 256 MiB of zeros in a few kB: refused at 64 MiB and a ratio of 200
+    path = tmp_path / "bomb.mseed"
+    path.write_bytes(packer(bytes(256 << 20)))
+    tracemalloc.start()
+    with pytest.raises(RecordRejected, match="more than 200 times its packed size"):
+        read_with_obspy(obspy.read, path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # What is unpacked, and its buffer as it grows by an eighth
+    assert peak < 2 * (64 << 20)
+
+
+@pytest.mark.parametrize(
+    ("content", "packer"), [(lzma.compress(bytes(9)), "xz"), (b"\x28\xb5\x2f\xfd$", "Zstandard")]
+)
+def test_other_packers_are_named(tmp_path: Path, content, packer):
+    (tmp_path / "record.mseed").write_bytes(content)
+    with pytest.raises(RecordRejected, match=f"it is packed by {packer}: unpack it first"):
+        read_with_obspy(obspy.read, tmp_path / "record.mseed")
+
+
 def test_archives_under_other_names_are_named(tmp_path: Path):
     (tmp_path / "record").write_bytes(zipped(b"words"))
     with pytest.raises(RecordRejected, match=r"it is an archive: its name must end with \.zip"):
@@ -206,12 +232,14 @@ def test_foreign_readers_work_apart_and_read_the_same():
     }.items():
         content = (folder / file).read_bytes()
         here = obspy.read(io.BytesIO(content), format=name)
-        apart = read_bytes_with_obspy(obspy.read, content, "service")
+        apart = read_bytes_with_obspy(obspy.read, content, "service", format=name)
         assert apart == here
     # A recorder's file without its last packet is read with its warning
     content = (folder / "reftek/tests/data/221935615_00000000").read_bytes()
-    with pytest.warns(UserWarning, match="File might be truncated"):
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always")
         assert read_bytes_with_obspy(obspy.read, content, "service")[0].stats.npts > 0
+    assert any("File might be truncated" in str(doubt.message) for doubt in doubts)
     for file in ("dataless.seed.BW_FURT", "RESP.BK.BRIB..BV1"):
         content = (folder / "xseed/tests/data" / file).read_bytes()
         here = obspy.read_inventory(io.BytesIO(content))
