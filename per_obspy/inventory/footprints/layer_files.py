@@ -7,6 +7,7 @@ follow it to other files and addresses.
 """
 
 import json
+import re
 import sqlite3
 import warnings
 from collections.abc import Iterator, Mapping
@@ -52,8 +53,11 @@ _BEGINNINGS = {
     **dict.fromkeys(JSON_SUFFIXES, (b"{", b"[")),
 }
 
-#: Further files of a Shapefile.
-SHAPEFILE_PARTS = (".dbf", ".shx", ".prj", ".cpg", ".qix", ".sbn", ".sbx", ".idm", ".ind")
+#: How SQLite keeps a table that holds its rows, and the index of places of one.
+_TABLE = re.compile(r"\s*CREATE\s+TABLE\b", re.IGNORECASE)
+_PLACES = re.compile(
+    r"""\s*CREATE\s+VIRTUAL\s+TABLE\s+(?:"[^"]*"|\w+)\s+USING\s+"?rtree"?\s*\(""", re.IGNORECASE
+)
 
 #: Longest beginning of a GeoJSON file in which members of the collection are sought, bytes.
 HEAD = 1 << 20
@@ -208,38 +212,43 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
         return
     with TemporaryDirectory(prefix="per_obspy_") as folder:
         with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
-            foreign = set(package.execute(f"SELECT type, name FROM {_FOREIGN}"))
-            _require_stored(file, package)
+            foreign = _views(package)
+            _require_stored(file, package, foreign)
             copy = Path(folder, "layer.gpkg") if foreign else file
             if foreign:
                 with closing(sqlite3.connect(copy)) as target:
                     package.backup(target)
-                    _remove(target)
-        yield copy, {name for _, name in foreign}
+                    _remove(target, foreign)
+        yield copy, foreign
 
 
-#: Entries of an SQLite database that are neither tables nor the index of places of one.
-_FOREIGN = (
-    "sqlite_master WHERE type = 'view' OR type = 'table' AND sql LIKE 'create virtual%'"
-    " AND sql NOT LIKE '%using rtree%' AND sql NOT LIKE '%using \"rtree%'"
-)
+def _views(package: sqlite3.Connection) -> set[str]:
+    """Return the views and virtual tables of a database but for the index of places."""
+    entries = package.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('view', 'table')")
+    return {
+        name
+        for name, sql in entries
+        if sql and not (_TABLE.match(sql) or _PLACES.match(sql))
+    }
 
 
-def _require_stored(file: Path, package: sqlite3.Connection) -> None:
+def _require_stored(file: Path, package: sqlite3.Connection, foreign: set[str]) -> None:
     """Refuse tables whose columns are computed: by functions that may do anything."""
     tables = package.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
     for (table,) in tables:
         columns = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
-        for (column,) in package.execute(columns, (table,)):
+        for (column,) in () if table in foreign else package.execute(columns, (table,)):
             problem = f"column {column} of table {table} is computed, expected a stored one"
             raise CatalogError(str(file), problem)
 
 
-def _remove(package: sqlite3.Connection) -> None:
+def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
     """Remove views and virtual tables, triggers, and the layers that they were."""
     package.execute("PRAGMA writable_schema = ON")
-    package.execute(f"DELETE FROM {_FOREIGN} OR type = 'trigger'")
-    for table in ("gpkg_contents", "gpkg_geometry_columns"):
+    package.execute("DELETE FROM sqlite_master WHERE type = 'trigger'")
+    for name in foreign:
+        package.execute("DELETE FROM sqlite_master WHERE name = ?", (name,))
+    for table in {"gpkg_contents", "gpkg_geometry_columns"} - foreign:
         tables = "SELECT name FROM sqlite_master WHERE type = 'table'"
         package.execute(f"DELETE FROM {table} WHERE table_name NOT IN ({tables})")
     package.commit()
