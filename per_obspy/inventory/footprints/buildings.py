@@ -140,8 +140,8 @@ def projected(outlines: pa.Array, source: str) -> Projected:
     for block in blocks:
         degrees = polygons(block)
         place.append(shapely.get_coordinates(shapely.centroid(degrees)))
-        boxes.append(shapely.total_bounds(degrees))
-    transformer, central_meridian = _projection(np.array(boxes), source)
+        boxes.append(shapely.bounds(degrees))
+    transformer, central_meridian = _projection(np.concatenate(boxes), source)
     # Boxes and areas in metres
     bounds, area = [], []
     for block in blocks:
@@ -153,12 +153,17 @@ def projected(outlines: pa.Array, source: str) -> Projected:
         return _in_metres(outlines.take(pa.array(numbers)), transformer)
 
     near = Outlines(np.concatenate(bounds), chosen)
-    return Projected(near, np.concatenate(place), np.concatenate(area), central_meridian)
+    longitude, latitude = np.concatenate(place).T
+    centres = np.column_stack([longitude - 360.0 * (longitude > 180.0), latitude])
+    return Projected(near, centres, np.concatenate(area), central_meridian)
 
 
 def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:
     """Return a transverse Mercator projection about the middle of boxes, and its meridian."""
-    # Around all boxes
+    # Around all boxes; across 180 degrees those to the west of it go on beyond it
+    if np.ptp(boxes[:, ::2]) > 180.0:
+        beyond = boxes[:, 2] < 0.0
+        boxes = np.where(beyond[:, None] & [True, False, True, False], boxes + 360.0, boxes)
     west, south = boxes[:, :2].min(axis=0)
     east, north = boxes[:, 2:].max(axis=0)
     if east - west > WIDEST_LAYER:
