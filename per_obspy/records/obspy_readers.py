@@ -63,9 +63,29 @@ FORMATS = {kind: frozenset(names.split()) for kind, names in _FORMATS.items()}
 #: Formats that are read in this process: those of this package, and the usual ones of ObsPy, whose
 #: readers believe no size and run through a file once.
 _HERE = frozenset(
-    "MSEED SAC KNET QUAKEML STATIONXML STATIONTXT"
-    " AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC UNAM"
-    " USC".split()
+    [
+        "MSEED",
+        "SAC",
+        "KNET",
+        "QUAKEML",
+        "STATIONXML",
+        "STATIONTXT",
+        "AFAD",
+        "BHRC",
+        "COSMOS",
+        "CSMIP_V1",
+        "CSMIP_V2",
+        "CWB",
+        "DYNA",
+        "GEONET",
+        "ITACA",
+        "NSMN",
+        "PEER_AT2",
+        "RENADIC",
+        "SMC",
+        "UNAM",
+        "USC",
+    ]
 )
 
 #: name of a reader of ObsPy -> kind of its plugins

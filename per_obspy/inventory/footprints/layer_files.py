@@ -170,6 +170,7 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
         pyogrio.errors.DataLayerError,
         pa.ArrowException,
         sqlite3.Error,
+        OSError,
         UnicodeDecodeError,
     ) as error:
         raise CatalogError(str(file), unreadable_reason(file, kind, error)) from error
@@ -196,7 +197,9 @@ def _require_beginning(file: Path, kind: str) -> None:
     if suffix == ".shp" and not file.is_symlink():
         for part in file.parent.iterdir():
             if part.is_symlink() and part.stem == file.stem:
-                raise CatalogError(str(file), f"its part {part.name} is a link that leads elsewhere")
+                raise CatalogError(
+                    str(file), f"its part {part.name} is a link that leads elsewhere"
+                )
 
 
 @contextmanager
@@ -225,11 +228,7 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
 def _views(package: sqlite3.Connection) -> set[str]:
     """Return the views and virtual tables of a database but for the index of places."""
     entries = package.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('view', 'table')")
-    return {
-        name
-        for name, sql in entries
-        if sql and not (_TABLE.match(sql) or _PLACES.match(sql))
-    }
+    return {name for name, sql in entries if sql and not (_TABLE.match(sql) or _PLACES.match(sql))}
 
 
 def _require_stored(file: Path, package: sqlite3.Connection, foreign: set[str]) -> None:

@@ -80,7 +80,9 @@ def test_no_text_leads_elsewhere_whatever_the_suffix(tmp_path, service, kind):
     for suffix in SUFFIXES:
         path = tmp_path / f"town{suffix}"
         path.write_text(texts(address)[kind])
-        with pytest.raises(CatalogError, match=rf"town\{suffix}: (not |un|no |points|a doc|neither)"):
+        with pytest.raises(
+            CatalogError, match=rf"town\{suffix}: (not |un|no |points|a doc|neither)"
+        ):
             read_layer(path)
     assert asked == []
 
@@ -112,7 +114,9 @@ def test_links_of_geojson_are_not_followed(town, service, key, place):
     system = {"type": "link", "properties": {"href": f"{web}/a.wkt", "type": "ogcwkt"}}
     text = json.dumps({**content, **links})
     member = f'"{key}": {json.dumps(system)}'
-    path.write_text(f"{{{member}, {text[1:]}" if place == "features" else f"{text[:-1]}, {member}}}")
+    path.write_text(
+        f"{{{member}, {text[1:]}" if place == "features" else f"{text[:-1]}, {member}}}"
+    )
     try:
         # Without the link, the default of the format holds
         assert len(read_layer(path).outlines) == 3
@@ -205,9 +209,7 @@ def test_tables_of_the_format_are_no_views(package, table):
         f"create view {table} as with recursive n(i) as (select 1 union all select i+1 from n)"
         f" select old.* from old, n"
     )
-    path = package(
-        "pragma legacy_alter_table = on", f"alter table {table} rename to old", endless
-    )
+    path = package("pragma legacy_alter_table = on", f"alter table {table} rename to old", endless)
     try:
         # Extensions are not needed
         assert len(read_layer(path).outlines) == 3
