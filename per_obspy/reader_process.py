@@ -18,7 +18,7 @@ import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple, cast
 
 #: Drivers of GDAL that are used; its own work needs the one of memory.
 DRIVERS = (
@@ -84,6 +84,7 @@ class _Reader:
 
     def started(self) -> "subprocess.Popen[bytes]":
         """Return the process, which is started if it is not there."""
+        # Exits, faults and limits end it; a copy of this program has none
         if self.process is None or self.owner != os.getpid() or self.process.poll() is not None:
             start = f"import sys; sys.path[:] = {sys.path!r}; "
             start += f"from {__name__} import _serve; _serve()"
@@ -137,15 +138,15 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
     """
     with _reader.lock:
         process = _reader.started()
-        assert process.stdin is not None and process.stdout is not None  # pipes, as asked for
+        calls, answers = cast("IO[bytes]", process.stdin), cast("IO[bytes]", process.stdout)
         late = threading.Event()
         clock = threading.Timer(limits.seconds * _PATIENCE, lambda: (late.set(), process.kill()))
         clock.daemon = True
         clock.start()
         try:
-            pickle.dump((limits, os.getcwd(), function, arguments), process.stdin, protocol=5)
-            process.stdin.flush()
-            is_value, answer = pickle.load(process.stdout)
+            pickle.dump((limits, str(Path.cwd()), function, arguments), calls, protocol=5)
+            calls.flush()
+            is_value, answer = pickle.load(answers)  # noqa: S301 - of our own process
             # Memory that was short may not be free again
             if isinstance(answer, MemoryError):
                 _reader.end()
@@ -181,7 +182,7 @@ def _serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         try:
-            limits, folder, function, arguments = pickle.load(calls)
+            limits, folder, function, arguments = pickle.load(calls)  # noqa: S301 - ours
         except EOFError:
             return
         try:
@@ -200,7 +201,7 @@ def _serve() -> None:
 def _sendable(error: Exception) -> Exception:
     """Return an error that can be pickled."""
     try:
-        pickle.loads(pickle.dumps(error))
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - an error of this process
     except Exception:  # noqa: BLE001 - errors of other packages may be of any kind
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error.with_traceback(None)

@@ -2,6 +2,7 @@
 
 import os
 import time
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +12,7 @@ from per_obspy.reader_process import BeyondLimits, Limits, read_apart
 
 ROOMY = Limits(20.0, 1 << 30)
 
-linux = pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="limits of Linux")
+linux = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="limits of Linux")
 
 
 #: Programs for ``eval`` and ``exec``, which the process can import.

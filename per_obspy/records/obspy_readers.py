@@ -40,12 +40,12 @@ UNKNOWN_FORMAT = "its format is unknown"
 #: Formats of ObsPy that may be read, by kind of plugin. Left out are PICKLE, which runs code that
 #: the file holds; CSS and NNSA_KB_CORE, which read any file that the file names; CSZ, which unpacks
 #: without a limit; GSE1 and GSE2, whose decoder writes beyond its memory for damaged files; SC3ML,
-#: which SCML has replaced; and what is no recorded ground motion: exploration (RG16, SEG2, SEGY, SU),
-#: the Moon (ALSEP), sound (WAV), a volcano's network (DMX) and simulation (CYBERSHAKE).
+#: which SCML has replaced; and what is no recorded strong motion: exploration (RG16, SEG2, SEGY,
+#: SU), the Moon (ALSEP), sound (WAV), a volcano's network (DMX) and simulation (CYBERSHAKE).
 _FORMATS = {
-    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y WIN AH PDAS KINEMETRICS_EVT GCF KNET"
-    " REFTEK130 AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC"
-    " UNAM USC",
+    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y WIN AH PDAS KINEMETRICS_EVT GCF"
+    " KNET REFTEK130 AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC"
+    " SMC UNAM USC",
     "event": "QUAKEML SCML NLLOC_HYP CMTSOLUTION CSV EVENTTXT EVT FNETMT FOCMEC GSE2 HYPODDPHA"
     " IMS10BULLETIN MCHEDR NDK NORDIC SCARDEC ZMAP",
     "inventory": "STATIONXML SEED RESP SCML INVENTORYXML STATIONTXT XSEED",
@@ -221,17 +221,21 @@ def _called(
         place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
         if name in _HERE:
             return reader(BytesIO(content), format=name, check_compression=False, **options)
-        limits = _limits(len(content))
-        value, doubts = read_apart(limits, _read_apart, kind, content, place, name, options)
-        for doubt in doubts:
-            warnings.warn(doubt, stacklevel=2)
-        return value
+        return _value_apart(kind, content, place, name, options)
     except BeyondLimits as error:
         raise RecordRejected(str(source), f"{error}: damaged, or no {name} file") from error
     except PerError:
         raise
     except Exception as error:
         raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
+
+
+def _value_apart(kind: str, content: bytes, *arguments: Any) -> Any:
+    """Return what a reader in the process of readers returns, and pass its warnings on."""
+    value, doubts = read_apart(_limits(len(content)), _read_apart, kind, content, *arguments)
+    for doubt in doubts:
+        warnings.warn(doubt, stacklevel=2)
+    return value
 
 
 def _limits(size: int) -> Limits:

@@ -262,7 +262,7 @@ def test_a_reader_that_fails_loses_its_file_only(tmp_path: Path, monkeypatch, pr
     gcf = Path(obspy.__file__).parent / "io/gcf/tests/data/20160603_1910n.gcf"
     (tmp_path / "a.gcf").write_bytes(gcf.read_bytes())
     record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
-    monkeypatch.setattr(obspy_readers, "_limits", lambda size: Limits(1.0, 64 << 20))
+    monkeypatch.setattr(obspy_readers, "_limits", lambda _: Limits(1.0, 64 << 20))
     call = obspy_readers.read_apart
     monkeypatch.setattr(obspy_readers, "read_apart", lambda limits, *_: call(limits, exec, program))
     contents = find_stations(tmp_path)

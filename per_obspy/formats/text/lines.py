@@ -35,8 +35,8 @@ class Text(NamedTuple):
     """
     A file as lines without their ends.
 
-    Line numbers count from 0 in the code and from 1 in messages. A file may have been cut inside its
-    last number, which its form then shows, the more so where its last line has no end.
+    Line numbers count from 0 in the code and from 1 in messages. A file may have been cut inside
+    its last number, which its form then shows, the more so where its last line has no end.
     """
 
     name: str
@@ -290,14 +290,16 @@ def _is_short(word: str, others: list[str]) -> bool:
     if len(others) < 2 or (len(forms) > 1 and len(others) < _MANY):
         return False
     decimals, exponent = _form(word)
-    return decimals < min(n for n, _ in forms) or exponent < min(n for _, n in forms)
+    fewest, shortest = map(min, zip(*forms, strict=True))
+    return bool(decimals < fewest or exponent < shortest)
 
 
 def _ends_early(row: str, above: list[str], place: int) -> bool:
     """Check whether the last word of a line ends before the end that all above it share."""
     words = [[*re.finditer(r"\S+", other)][place] for other in above]
     # Words of several lengths with one end are in a column
-    ends, starts = {word.end() for word in words}, {word.start() for word in words}
+    ends = {word.end() for word in words}
+    starts = {word.start() for word in words}
     return len(ends) == 1 < len(starts) and len(row.rstrip()) < min(ends)
 
 

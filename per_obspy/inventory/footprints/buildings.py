@@ -20,7 +20,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.layers import BLOCK, Geometries, polygons
-from per_obspy.inventory.footprints.neighbours import IntArray, Outlines
+from per_obspy.inventory.footprints.neighbours import Outlines
 
 #: A local projection is true to scale within this range of longitudes, degrees.
 WIDEST_LAYER = 6.0
@@ -149,12 +149,13 @@ def projected(outlines: pa.Array, source: str) -> Projected:
         bounds.append(shapely.bounds(metres))
         area.append(shapely.area(metres))
 
-    def chosen(numbers: IntArray) -> Geometries:
-        return _in_metres(outlines.take(pa.array(numbers)), transformer)
-
-    near = Outlines(np.concatenate(bounds), chosen)
-    longitude, latitude = np.concatenate(place).T
-    centres = np.column_stack([longitude - 360.0 * (longitude > 180.0), latitude])
+    near = Outlines(
+        np.concatenate(bounds),
+        lambda numbers: _in_metres(outlines.take(pa.array(numbers)), transformer),
+    )
+    # Outlines may go on beyond 180 degrees, places do not
+    centres = np.concatenate(place)
+    centres[centres[:, 0] > 180.0, 0] -= 360.0
     return Projected(near, centres, np.concatenate(area), central_meridian)
 
 
@@ -172,6 +173,7 @@ def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, flo
             f"footprints from {west:g} to {east:g} degrees east: split the layer, "
             f"a local projection covers {WIDEST_LAYER:g} degrees",
         )
+    # True to scale along the meridian in their middle
     longitude, latitude = float(west + east) / 2.0, float(south + north) / 2.0
     local = pyproj.CRS.from_dict(
         {"proj": "tmerc", "lon_0": longitude, "lat_0": latitude, "datum": "WGS84"}

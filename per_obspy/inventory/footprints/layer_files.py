@@ -213,6 +213,7 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
     if file.suffix.lower() != ".gpkg":
         yield file, set()
         return
+    # Only a package that has some is copied
     with TemporaryDirectory(prefix="per_obspy_") as folder:
         with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
             foreign = _views(package)
@@ -319,6 +320,7 @@ def _members(file: Path) -> dict[str, Any]:
 def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
     """Return the requested one of the layers and their geometries, or the only one with them."""
     kinds = {str(name): kind for name, kind in layers}
+    # A view may be what the user means
     if layer in views or (views and layer is None and not any(kinds.values())):
         shown = layer or ", ".join(sorted(views))
         problem = f"layer {shown} is a view, which may have no end: save it as a table"

@@ -124,7 +124,7 @@ def _across(west: float, east: float) -> list[shapely.Polygon]:
     ids=["beyond", "signs", "parts", "turn"],
 )
 def test_a_town_across_the_date_line_is_like_any_other(tmp_path, shape):
-    # Houses of 1e-4 degrees, the second of which lies across 180: as far east of 0 they are the same
+    # Houses of 1e-4 degrees, the second of which lies across 180, and the same ones near 11
     houses = np.array(_across(179.99985, 179.99995))
     if shape is None:
         west, east = shapely.box(0, -90, 180, 90), shapely.box(180, -90, 190, 90)
