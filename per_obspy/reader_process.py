@@ -140,8 +140,12 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
         process = _reader.started()
         calls, answers = cast("IO[bytes]", process.stdin), cast("IO[bytes]", process.stdout)
         late = threading.Event()
-        clock = threading.Timer(limits.seconds * _PATIENCE, lambda: (late.set(), process.kill()))
-        clock.daemon = True
+
+        def stop() -> None:
+            late.set()
+            process.kill()
+
+        clock = threading.Timer(limits.seconds * _PATIENCE, stop)
         clock.start()
         try:
             pickle.dump((limits, str(Path.cwd()), function, arguments), calls, protocol=5)

@@ -88,6 +88,9 @@ _HERE = frozenset(
     ]
 )
 
+#: format -> check of its content
+_CHECKS = {"KNET": require_whole_numbers, "SAC": require_coordinates}
+
 #: name of a reader of ObsPy -> kind of its plugins
 _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
 _READERS = {kind: reader for reader, kind in _KINDS.items()}
@@ -214,10 +217,8 @@ def _called(
         if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
         # Faults that ObsPy would not notice, or not survive
-        if name == "KNET":
-            require_whole_numbers(content, str(source))
-        if name == "SAC":
-            require_coordinates(content, str(source))
+        if require := _CHECKS.get(name):
+            require(content, str(source))
         place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
         if name in _HERE:
             return reader(BytesIO(content), format=name, check_compression=False, **options)

@@ -24,8 +24,9 @@ _NUMBER_LETTERS = b"0123456789+-.eE \n"
 LONGEST_LINE, LONGEST_NUMBER = 2000, 40
 
 #: last lines whose numbers are compared with the last one; numbers of different forms from which on
-#: the shortest of all is taken for a part of one
-_COMPARED, _MANY = 1001, 100
+#: the shortest of all is taken for a part of one; lines that end alike from which on they do so by
+#: their format, not by chance (reasoned)
+_COMPARED, _MANY, _FEW = 1001, 100, 20
 
 #: a decimal number in a regular expression; longer runs of digits are no number
 DECIMAL = r"(-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d))"
@@ -300,7 +301,8 @@ def _ends_early(row: str, above: list[str], place: int) -> bool:
     # Words of several lengths with one end are in a column
     ends = {word.end() for word in words}
     starts = {word.start() for word in words}
-    return len(ends) == 1 < len(starts) and len(row.rstrip()) < min(ends)
+    is_column = len(above) >= _FEW and len(ends) == 1 < len(starts)
+    return is_column and len(row.rstrip()) < min(ends)
 
 
 def _form(word: str) -> tuple[int, int]:
