@@ -50,46 +50,21 @@ _FORMATS = {
     " IMS10BULLETIN MCHEDR NDK NORDIC SCARDEC ZMAP",
     "inventory": "STATIONXML SEED RESP SCML INVENTORYXML STATIONTXT XSEED",
 }
-FORMATS = {
-    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y SEGY SU SEG2 WAV WIN AH"
-    " PDAS KINEMETRICS_EVT GCF DMX ALSEP_PSE ALSEP_WTN ALSEP_WTH CYBERSHAKE KNET REFTEK130 RG16"
-    " AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC UNAM USC",
-    "event": "QUAKEML SCML NLLOC_HYP CMTSOLUTION CSV EVENTTXT EVT FNETMT FOCMEC GSE2 HYPODDPHA"
-    " IMS10BULLETIN MCHEDR NDK NORDIC SCARDEC ZMAP",
-    "inventory": "STATIONXML SEED RESP SCML INVENTORYXML STATIONTXT XSEED",
-}
 FORMATS = {kind: frozenset(names.split()) for kind, names in _FORMATS.items()}
 
 #: Formats that are read in this process: those of this package, and the usual ones of ObsPy, whose
 #: readers believe no size and run through a file once.
-_HERE = frozenset(
-    [
-        "MSEED",
-        "SAC",
-        "KNET",
-        "QUAKEML",
-        "STATIONXML",
-        "STATIONTXT",
-        "AFAD",
-        "BHRC",
-        "COSMOS",
-        "CSMIP_V1",
-        "CSMIP_V2",
-        "CWB",
-        "DYNA",
-        "GEONET",
-        "ITACA",
-        "NSMN",
-        "PEER_AT2",
-        "RENADIC",
-        "SMC",
-        "UNAM",
-        "USC",
-    ]
-)
+_HERE = {
+    *("MSEED", "SAC", "KNET", "QUAKEML", "STATIONXML", "STATIONTXT", "AFAD", "BHRC", "COSMOS"),
+    *("CSMIP_V1", "CSMIP_V2", "CWB", "DYNA", "GEONET", "ITACA", "NSMN", "PEER_AT2", "RENADIC"),
+    *("SMC", "UNAM", "USC"),
+}
 
 #: format -> check of its content
-_CHECKS = {"KNET": require_whole_numbers, "SAC": require_coordinates}
+_CHECKS: dict[str, Callable[[bytes, str], None]] = {
+    "KNET": require_whole_numbers,
+    "SAC": require_coordinates,
+}
 
 #: name of a reader of ObsPy -> kind of its plugins
 _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
@@ -214,7 +189,7 @@ def _called(
         # Samples in a second file are found by the path of the first only
         if name is None and beside:
             name = _detected(kind, str(source), _TWO_FILES)
-        if name not in FORMATS[kind]:
+        if name is None or name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
         # Faults that ObsPy would not notice, or not survive
         if require := _CHECKS.get(name):

@@ -120,9 +120,10 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     if suffix in GDAL_KINDS:
         _require_beginning(file, GDAL_KINDS[suffix])
     try:
-        return read_layer_apart(_limits(file), _read, file, layer)
+        found: RawLayer = read_layer_apart(_limits(file), _read, file, layer)
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
+    return found
 
 
 def _limits(file: Path) -> Limits:
