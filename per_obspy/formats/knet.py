@@ -6,7 +6,6 @@ from obspy import Trace
 
 from per_obspy.constants import GAL
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.lines import is_ended
 from per_obspy.formats.text.vocabulary import coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
@@ -70,10 +69,11 @@ def require_whole_numbers(content: bytes, name: str) -> None:
     Raises
     ------
     RecordRejected
-        If the last line has no end and stops inside a column.
+        If the last line stops inside a column, whether it has an end or not.
     """
     *_, line_before, last = [b"", b"", *content.rstrip(b"\x00\r\n ").splitlines()]
-    if not is_ended(content) and (len(line_before.rstrip()) - len(last)) % _WIDTH:
+    is_sample_line = not line_before.strip(b"0123456789- ")
+    if is_sample_line and (len(line_before.rstrip()) - len(last)) % _WIDTH:
         problem = f"last number: the file ends inside a column after {last[-_WIDTH:]!r}"
         raise RecordRejected(name, problem)
 

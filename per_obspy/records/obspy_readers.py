@@ -3,7 +3,8 @@ The one place where ObsPy reads files: allowed formats only, and every error is 
 
 ObsPy would unpickle a Stream, fetch texts that look like a URL, follow names of files that a file
 holds, and unpack archives without a limit. Formats are therefore found among those listed here, and
-files are handed over as bytes.
+files are handed over as bytes. Readers that neither belong to this package nor read most records
+work in a process of their own, with limits of time and memory.
 """
 
 import bz2
@@ -12,6 +13,7 @@ import gzip
 import re
 import tarfile
 import tempfile
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Collection
@@ -19,6 +21,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import obspy
 from obspy.core.util.base import ENTRY_POINTS
 from obspy.core.util.misc import buffered_load_entry_point
 
@@ -26,7 +29,10 @@ from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
-from per_obspy.records.archives.archive_files import read_file
+from per_obspy.reader_process import BeyondLimits, Limits, read_apart
+from per_obspy.records.archives.archive_files import LIMITS, read_file
+from per_obspy.records.archives.packed import PIECE
+from per_obspy.records.archives.walked import SMALL
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -34,19 +40,35 @@ UNKNOWN_FORMAT = "its format is unknown"
 #: Formats of ObsPy that may be read, by kind of plugin. Left out are PICKLE, which runs code that
 #: the file holds; CSS and NNSA_KB_CORE, which read any file that the file names; CSZ, which unpacks
 #: without a limit; GSE1 and GSE2, whose decoder writes beyond its memory for damaged files; SC3ML,
-#: which SCML has replaced.
+#: which SCML has replaced; and what is no recorded strong motion: exploration (RG16, SEG2, SEGY,
+#: SU), the Moon (ALSEP), sound (WAV), a volcano's network (DMX) and simulation (CYBERSHAKE).
 _FORMATS = {
-    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y SEGY SU SEG2 WAV WIN AH"
-    " PDAS KINEMETRICS_EVT GCF DMX ALSEP_PSE ALSEP_WTN ALSEP_WTH CYBERSHAKE KNET REFTEK130 RG16"
-    " AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC UNAM USC",
+    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y WIN AH PDAS KINEMETRICS_EVT GCF"
+    " KNET REFTEK130 AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC"
+    " SMC UNAM USC",
     "event": "QUAKEML SCML NLLOC_HYP CMTSOLUTION CSV EVENTTXT EVT FNETMT FOCMEC GSE2 HYPODDPHA"
     " IMS10BULLETIN MCHEDR NDK NORDIC SCARDEC ZMAP",
     "inventory": "STATIONXML SEED RESP SCML INVENTORYXML STATIONTXT XSEED",
 }
 FORMATS = {kind: frozenset(names.split()) for kind, names in _FORMATS.items()}
 
+#: Formats that are read in this process: those of this package, and the usual ones of ObsPy, whose
+#: readers believe no size and run through a file once.
+_HERE = {
+    *("MSEED", "SAC", "KNET", "QUAKEML", "STATIONXML", "STATIONTXT", "AFAD", "BHRC", "COSMOS"),
+    *("CSMIP_V1", "CSMIP_V2", "CWB", "DYNA", "GEONET", "ITACA", "NSMN", "PEER_AT2", "RENADIC"),
+    *("SMC", "UNAM", "USC"),
+}
+
+#: format -> check of its content
+_CHECKS: dict[str, Callable[[bytes, str], None]] = {
+    "KNET": require_whole_numbers,
+    "SAC": require_coordinates,
+}
+
 #: name of a reader of ObsPy -> kind of its plugins
 _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
+_READERS = {kind: reader for reader, kind in _KINDS.items()}
 
 #: Formats whose samples are in a second file of the same name.
 _TWO_FILES = ("Q",)
@@ -57,6 +79,8 @@ _UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": b
 #: Lines of a plain table that may hold titles, and a line of numbers.
 TITLES = 8
 _NUMBERS = re.compile(r"\s*+(?:[-+]?[\d.]++(?:[eEdD][-+]?\d++)?[\s,;]*+)++")
+#: first bytes of files that other programs packed -> their name
+_OTHER_PACKERS = {b"\xfd7zXZ\x00": "xz", b"\x28\xb5\x2f\xfd": "Zstandard", b"7z\xbc\xaf": "7-Zip"}
 
 #: Largest size of an unpacked file: a day of three components at 200 Hz as text has 400 MB.
 LARGEST_UNPACKED = 512 * 1024**2
@@ -141,16 +165,26 @@ def _unpacked(content: bytes, path: Path) -> bytes:
     unpacker = next(unpackers, None)
     if unpacker is None:
         return content
-    # One byte more than allowed shows that the file is too large
+    # Piece by piece, so that a bomb is refused before it fills the memory
+    unpacked = BytesIO()
     try:
         with unpacker(BytesIO(content)) as file:
-            unpacked: bytes = file.read(LARGEST_UNPACKED + 1)
+            while piece := file.read(PIECE):
+                unpacked.write(piece)
+                _require_size(unpacked.tell(), len(content), path)
     except (OSError, EOFError, zlib.error) as error:
         raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
-    if len(unpacked) > LARGEST_UNPACKED:
+    return unpacked.getvalue()
+
+
+def _require_size(unpacked: int, packed: int, path: Path) -> None:
+    """Refuse a packed file that unpacks to more than the limits, bytes."""
+    if unpacked > LARGEST_UNPACKED:
         problem = f"it unpacks to more than {LARGEST_UNPACKED // 1024**2} MiB: unpack it by hand"
         raise RecordRejected(str(path), problem)
-    return unpacked
+    if unpacked > max(LIMITS.largest_ratio * packed, SMALL):
+        problem = f"it unpacks to more than {LIMITS.largest_ratio:g} times its packed size"
+        raise RecordRejected(str(path), f"{problem}: unpack it by hand")
 
 
 def _called(
@@ -164,22 +198,53 @@ def _called(
         # Samples in a second file are found by the path of the first only
         if name is None and beside:
             name = _detected(kind, str(source), _TWO_FILES)
-        if name not in FORMATS[kind]:
+        if name is None or name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
         # Faults that ObsPy would not notice, or not survive
-        if name == "KNET":
-            require_whole_numbers(content, str(source))
-        if name == "SAC":
-            require_coordinates(content, str(source))
-        file = glob.escape(str(source)) if name in _TWO_FILES and beside else _File(content)
-        # The name may end with a direction
-        if isinstance(file, _File):
+        if require := _CHECKS.get(name):
+            require(content, str(source))
+        if name in _HERE:
+            # The name may end with a direction
+            file = _File(content)
             file.name = str(source)
-        return reader(file, format=name, check_compression=False, **options)
+            return reader(file, format=name, check_compression=False, **options)
+        place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
+        return _value_apart(kind, content, place, name, options)
+    except BeyondLimits as error:
+        raise RecordRejected(str(source), f"{error}: damaged, or no {name} file") from error
     except PerError:
         raise
     except Exception as error:
         raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
+
+
+def _value_apart(kind: str, content: bytes, *arguments: Any) -> Any:
+    """Return what a reader in the process of readers returns, and pass its warnings on."""
+    value, doubts = read_apart(_limits(len(content)), _read_apart, kind, content, *arguments)
+    for doubt in doubts:
+        warnings.warn(doubt, stacklevel=2)
+    return value
+
+
+def _limits(size: int) -> Limits:
+    """
+    Return the limits of reading a file of a size, bytes.
+
+    Reasoned: WIN, the slowest reader, takes 5 s for each MiB; numbers in memory, and texts of a few
+    letters, take at most 40 times their place in a file.
+    """
+    return Limits(20.0 + 20.0 * size / 2**20, (1 << 30) + 40 * size)
+
+
+def _read_apart(
+    kind: str, content: bytes, place: str | None, name: str, options: dict[str, Any]
+) -> tuple[Any, list[str]]:
+    """Read a file, by its bytes or its place, in the process of readers; return warnings too."""
+    reader, file = getattr(obspy, _READERS[kind]), place or BytesIO(content)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always")
+        value = reader(file, format=name, check_compression=False, **options)
+    return value, [str(doubt.message) for doubt in doubts]
 
 
 def _format(kind: str, content: bytes) -> str | None:
@@ -213,6 +278,9 @@ def _unknown(content: bytes) -> str:
     """Return the reason why no format is found; an archive is opened by its name only."""
     if zipfile.is_zipfile(BytesIO(content)) or tarfile.is_tarfile(BytesIO(content)):
         return "it is an archive: its name must end with .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz"
+    for mark, packer in _OTHER_PACKERS.items():
+        if content.startswith(mark):
+            return f"it is packed by {packer}: unpack it first"
     problem = f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
     if _has_plain_numbers(content):
         return f"{problem}; a table of samples is read where [[records.columns]] describes it"

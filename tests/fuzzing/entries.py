@@ -1,11 +1,14 @@
 """Every entry of files from outside: a sample of the file and its reader."""
 
+import gzip
 import io
 import json
 import socket
+import sqlite3
 import tarfile
 import zipfile
 from collections.abc import Callable, Iterable
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -42,6 +45,7 @@ from obspy.core.event import Catalog, Event, Magnitude, Origin
 from station_files import START, THREE, inventory, record
 
 from per_obspy import config
+from per_obspy.errors import PerError
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
@@ -59,20 +63,23 @@ from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
 #: Small files of other formats among the test data of ObsPy.
 OBSPY_FORMATS = {
     "AH": "ah/tests/data/TSG/BRV.TSG.KSM.sE12.resp",
-    "ALSEP_WTH": "alsep/tests/data/wth.5.6.mini",
     "GCF": "gcf/tests/data/20160603_1910n.gcf",
     "PDAS": "pdas/tests/data/p1246001.108",
     "REFTEK130": "reftek/tests/data/221935615_00000000",
-    "RG16": "rg16/tests/data/one_channel_many_traces.fcnt",
     "SACXY": "sac/tests/data/testxy.sac",
-    "SEG2": "seg2/tests/data/20180307_031245000.0.seg2",
-    "SEGY": "segy/tests/data/example.y_first_trace",
     "SEISAN": "seisan/tests/data/2011-09-06-1311-36S.A1032_001BH_Z",
     "SH_ASC": "sh/tests/data/TEST_090101_0101.ASC",
     "SLIST": "ascii/tests/data/slist_float.ascii",
     "TSPAIR": "ascii/tests/data/tspair_float.ascii",
-    "WAV": "wav/tests/data/3cssan.near.8.1.RNON.wav",
     "WIN": "win/tests/data/25112618_ch0000.24bits",
+}
+#: Formats of ObsPy that are left out: such files are refused, and the record beside them is read.
+LEFT_OUT = {
+    "ALSEP_WTH": "alsep/tests/data/wth.5.6.mini",
+    "RG16": "rg16/tests/data/one_channel_many_traces.fcnt",
+    "SEG2": "seg2/tests/data/20180307_031245000.0.seg2",
+    "SEGY": "segy/tests/data/example.y_first_trace",
+    "WAV": "wav/tests/data/3cssan.near.8.1.RNON.wav",
 }
 KNET = "nied/tests/data/test.knet"
 
@@ -117,6 +124,20 @@ gap = "cm"
 
 CURVE = b"period,damping,sd\n0.1,0.05,0.01\n1.0,0.05,0.1\n4.0,0.05,0.4\n"
 
+#: A place of this machine that no layer may ask, and texts that lead there.
+FORBIDDEN = socket.create_server(("127.0.0.1", 0))
+FORBIDDEN.setblocking(False)
+WEB = f"http://127.0.0.1:{FORBIDDEN.getsockname()[1]}"
+FOREIGN = {
+    "vrt": '<OGRVRTDataSource><OGRVRTLayer name="x"><SrcDataSource>/vsicurl/{}/a.geojson'
+    "</SrcDataSource></OGRVRTLayer></OGRVRTDataSource>",
+    "gdalg": '{{"type": "gdal_streamed_alg", "command_line":'
+    ' "gdal vector pipeline ! read /vsicurl/{}/b.geojson"}}',
+    "wfs": "<OGRWFSDataSource><URL>{}/wfs</URL></OGRWFSDataSource>",
+    "link": '{{"type": "FeatureCollection", "features": [], "crs": {{"type": "link",'
+    ' "properties": {{"href": "{}/a.wkt", "type": "ogcwkt"}}}}}}',
+}
+
 #: Return the numbers of a file, which must be finite.
 Read = Callable[[Path], Iterable[object]]
 
@@ -160,12 +181,20 @@ def _record_files() -> dict[str, Entry]:
         name: Entry(f"record.{name.lower()}", (bundled / file).read_bytes, partial(_direct, name))
         for name, file in OBSPY_FORMATS.items()
     }
-    return files | {
-        "mseed": Entry("record.mseed", partial(_written, "MSEED"), _raw_record),
-        "sac": Entry("record.sac", partial(_written, "SAC"), _raw_record),
-        "knet": Entry("record.knet", (bundled / KNET).read_bytes, _records),
-        "asdf": Entry("workspace.h5", _workspace, _asdf),
+    by_detection = {
+        f"{name}_detected": Entry("x.bin", (bundled / file).read_bytes, _record_beside)
+        for name, file in (OBSPY_FORMATS | LEFT_OUT).items()
     }
+    return (
+        files
+        | by_detection
+        | {
+            "mseed": Entry("record.mseed", partial(_written, "MSEED"), _raw_record),
+            "sac": Entry("record.sac", partial(_written, "SAC"), _raw_record),
+            "knet": Entry("record.knet", (bundled / KNET).read_bytes, _records),
+            "asdf": Entry("workspace.h5", _workspace, _asdf),
+        }
+    )
 
 
 def _archives() -> dict[str, Entry]:
@@ -204,6 +233,14 @@ def _inventories() -> dict[str, Entry]:
         "pairs_parquet": Entry("pairs.parquet", _pairs_parquet, _pairs),
         "footprints_geojson": Entry("town.geojson", partial(_layer, "a.geojson"), _footprints),
         "footprints_gpkg": Entry("town.gpkg", partial(_layer, "a.gpkg"), _footprints),
+        "footprints_fgb": Entry("town.fgb", partial(_layer, "a.fgb"), _footprints),
+        "footprints_view": Entry("town.gpkg", _view, _footprints),
+        "packed_lines": Entry("town.geojsonl.gz", _packed, _footprints),
+        **{
+            f"foreign_{kind}_{suffix}": Entry(f"town.{suffix}", partial(_foreign, kind), _led)
+            for kind in FOREIGN
+            for suffix in ("geojson", "gpkg", "shp", "fgb", "osm", "gml")
+        },
         "citygml_lod0": Entry("town.gml", partial(_town, plateau_lod0), _footprints),
         "citygml_lod1": Entry("town.gml", partial(_town, plateau_lod1), _footprints),
         "assets": Entry("town.json", partial(_town, r2d_assets), _footprints),
@@ -415,6 +452,44 @@ def _layer(name: str) -> bytes:
         return path.read_bytes()
 
 
+def _view() -> bytes:
+    """Return a GeoPackage with a layer that is a view, and one that is a table."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "a.gpkg")
+        path.write_bytes(_layer("a.gpkg"))
+        with closing(sqlite3.connect(path)) as package:
+            package.execute("CREATE VIEW tall AS SELECT * FROM a WHERE height > 1")
+            package.execute(
+                "INSERT INTO gpkg_contents (table_name, data_type, identifier, srs_id)"
+                " VALUES ('tall', 'features', 'tall', 4326)"
+            )
+            package.execute(
+                "INSERT INTO gpkg_geometry_columns VALUES ('tall', 'geom', 'POLYGON', 4326, 0, 0)"
+            )
+            package.commit()
+        return path.read_bytes()
+
+
+def _packed() -> bytes:
+    """Return four houses as packed lines of GeoJSON."""
+    return gzip.compress(_town(microsoft), mtime=0)
+
+
+def _foreign(kind: str) -> bytes:
+    """Return a text that leads elsewhere."""
+    return FOREIGN[kind].format(WEB).encode()
+
+
+def _led(path: Path) -> Iterable[object]:
+    """Read a file that is no layer, and fail if that asks for anything."""
+    with suppress(PerError):
+        pairs_from_footprints(path)
+    with suppress(BlockingIOError):
+        FORBIDDEN.accept()[0].close()
+        raise AssertionError("a layer has asked for something elsewhere")
+    return [0.0]
+
+
 def _town(write: Callable[[Path, Town], Path]) -> bytes:
     """Return four houses in the format of another source."""
     with TemporaryDirectory() as folder:
@@ -441,6 +516,17 @@ def _raw_record(path: Path) -> Iterable[object]:
     """Read raw counts with a good StationXML."""
     path.with_name("station.xml").write_bytes(_station_xml())
     return _records(path.parent)
+
+
+def _record_beside(path: Path) -> Iterable[object]:
+    """Read a good record in a folder with the file."""
+    path.with_name("station.xml").write_bytes(_station_xml())
+    path.with_name("record.mseed").write_bytes(_written("MSEED"))
+    numbers = list(_records(path.parent))
+    if not numbers:
+        raise AssertionError("the good record beside it is lost")
+    # Those of the file itself may be of any kind
+    return numbers[:1]
 
 
 def _text_beside(path: Path) -> Iterable[object]:

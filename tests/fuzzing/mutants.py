@@ -51,6 +51,8 @@ WORDS = (
     b"<!DOCTYPE x [<!ENTITY a 'b'>]>",
     b"\xe2\x80\xae",
     b"obspy.core.stream",
+    b"/vsicurl/http://127.0.0.1:9/x",
+    b"<OGRVRTDataSource>",
 )
 
 #: Sizes of the pieces that are replaced, bytes.
@@ -69,7 +71,8 @@ def _damaged_once(content: bytes, chance: random.Random) -> bytes:
     place = chance.randrange(len(content) + 1)
     kind = chance.randrange(8)
     if kind == 0:
-        return content[:place]
+        # A cut, which some systems end with a line or fill with zeros
+        return content[:place] + chance.choice((b"", b"\n", b"\r\n", bytes(9)))
     size = chance.choice(SIZES)
     old = content[place : place + size]
     return content[:place] + _piece(kind, old, chance) + content[place + size :]

@@ -3,8 +3,11 @@
 import bz2
 import gzip
 import io
+import lzma
 import pickle
 import tarfile
+import tracemalloc
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +18,7 @@ from obspy.core.util.base import ENTRY_POINTS
 from station_files import record
 
 from per_obspy.errors import RecordRejected
+from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
 from per_obspy.records.contents.metadata_files import read_inventories
 from per_obspy.records.event_file import read_event
@@ -109,10 +113,13 @@ def test_the_payload_is_one(tmp_path: Path):
     assert (tmp_path / "made").exists()
 
 
-def test_allowed_formats_are_all_but_those_that_reach_beyond_their_file():
+def test_allowed_formats_are_recorded_motion_that_does_not_reach_beyond_its_file():
     # a format that a new ObsPy brings is read only once it has been looked at
     left_out = {kind: set(ENTRY_POINTS[kind]) - names for kind, names in FORMATS.items()}
-    assert left_out["waveform"] == {"PICKLE", "CSS", "NNSA_KB_CORE", "GSE1", "GSE2"}
+    unsafe = {"PICKLE", "CSS", "NNSA_KB_CORE", "GSE1", "GSE2"}
+    moon = {"ALSEP_PSE", "ALSEP_WTN", "ALSEP_WTH"}
+    other = {"RG16", "SEG2", "SEGY", "SU", "WAV", "DMX", "CYBERSHAKE", *moon}
+    assert left_out["waveform"] == unsafe | other
     assert left_out["event"] == {"CSZ", "SC3ML"}
     assert left_out["inventory"] == {"SC3ML"}
 
@@ -148,6 +155,29 @@ def test_packed_files_are_read_up_to_a_limit(tmp_path: Path, packer, monkeypatch
     path.write_bytes(path.read_bytes()[:-12])
     with pytest.raises(RecordRejected, match="the packed file is damaged"):
         read_with_obspy(obspy.read, path)
+
+
+@pytest.mark.parametrize("packer", [gzip.compress, bz2.compress], ids=["gz", "bz2"])
+def test_a_bomb_is_refused_before_it_fills_the_memory(tmp_path: Path, packer):
+    # 256 MiB of zeros in a few kB: refused at 64 MiB and a ratio of 200
+    path = tmp_path / "bomb.mseed"
+    path.write_bytes(packer(bytes(256 << 20)))
+    tracemalloc.start()
+    with pytest.raises(RecordRejected, match="more than 200 times its packed size"):
+        read_with_obspy(obspy.read, path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # What is unpacked, and its buffer as it grows by an eighth
+    assert peak < 2 * (64 << 20)
+
+
+@pytest.mark.parametrize(
+    ("content", "packer"), [(lzma.compress(bytes(9)), "xz"), (b"\x28\xb5\x2f\xfd$", "Zstandard")]
+)
+def test_other_packers_are_named(tmp_path: Path, content, packer):
+    (tmp_path / "record.mseed").write_bytes(content)
+    with pytest.raises(RecordRejected, match=f"it is packed by {packer}: unpack it first"):
+        read_with_obspy(obspy.read, tmp_path / "record.mseed")
 
 
 def test_archives_under_other_names_are_named(tmp_path: Path):
@@ -190,6 +220,67 @@ def test_any_error_is_a_rejection_on_one_line(content: bytes, options: dict, rea
     with pytest.raises(RecordRejected, match=reason) as rejection:
         read_bytes_with_obspy(reader, content, "service", **options)
     assert "\n" not in str(rejection.value)
+
+
+def test_foreign_readers_work_apart_and_read_the_same():
+    # would catch samples, times or headers that change on the way between the processes
+    folder = Path(obspy.__file__).parent / "io"
+    for name, file in {
+        "GCF": "gcf/tests/data/20160603_1910n.gcf",
+        "SLIST": "ascii/tests/data/slist_float.ascii",
+        "WIN": "win/tests/data/25112618_ch0000.24bits",
+    }.items():
+        content = (folder / file).read_bytes()
+        here = obspy.read(io.BytesIO(content), format=name)
+        apart = read_bytes_with_obspy(obspy.read, content, "service", format=name)
+        assert apart == here
+    # A recorder's file without its last packet is read with its warning
+    content = (folder / "reftek/tests/data/221935615_00000000").read_bytes()
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always")
+        assert read_bytes_with_obspy(obspy.read, content, "service")[0].stats.npts > 0
+    assert any("File might be truncated" in str(doubt.message) for doubt in doubts)
+    for file in ("dataless.seed.BW_FURT", "RESP.BK.BRIB..BV1"):
+        content = (folder / "xseed/tests/data" / file).read_bytes()
+        here = obspy.read_inventory(io.BytesIO(content))
+        apart = read_bytes_with_obspy(obspy.read_inventory, content, "service")
+        assert apart.get_contents() == here.get_contents()
+        assert apart[0][0][0].response == here[0][0][0].response
+
+
+@pytest.mark.parametrize(
+    ("program", "reason"),
+    [
+        ("while True: pass", "reading it takes more than 1 s of processor time"),
+        ("bytearray(1 << 33)", "reading it takes more than 64 MiB of memory"),
+        ("import os; os.abort()", "reading it takes more than 64 MiB of memory"),
+        ("import os; os._exit(3)", "its reader ends with code 3"),
+    ],
+)
+def test_a_reader_that_fails_loses_its_file_only(tmp_path: Path, monkeypatch, program, reason):
+    # a GCF file whose reader never ends, fills the memory or ends the process
+    gcf = Path(obspy.__file__).parent / "io/gcf/tests/data/20160603_1910n.gcf"
+    (tmp_path / "a.gcf").write_bytes(gcf.read_bytes())
+    record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
+    monkeypatch.setattr(obspy_readers, "_limits", lambda _: Limits(1.0, 64 << 20))
+    call = obspy_readers.read_apart
+    monkeypatch.setattr(obspy_readers, "read_apart", lambda limits, *_: call(limits, exec, program))
+    contents = find_stations(tmp_path)
+    assert list(contents.stations) == ["CI.CLC"]
+    (row,) = contents.rejected
+    assert (row.name, row.reasons) == ("a.gcf", (f"{reason}: damaged, or no GCF file",))
+
+
+@pytest.mark.real_data
+def test_a_file_that_hung_is_a_row_of_the_rejected(tmp_path: Path, real_data: Path):
+    hangs = real_data / "field/record-that-hangs/x.rg16"
+    if not hangs.exists():
+        pytest.skip("no record-that-hangs among the data")
+    (tmp_path / "x.rg16").write_bytes(hangs.read_bytes())
+    record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
+    contents = find_stations(tmp_path)
+    assert list(contents.stations) == ["CI.CLC"]
+    assert [row.name for row in contents.rejected] == ["x.rg16"]
 
 
 @pytest.mark.parametrize(

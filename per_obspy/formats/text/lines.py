@@ -4,6 +4,7 @@ Text files of samples: lines, header fields and blocks of numbers.
 Every fault is reported with its file, line and field.
 """
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, NoReturn
@@ -22,6 +23,11 @@ _NUMBER_LETTERS = b"0123456789+-.eE \n"
 #: largest numbers of characters of a line and a number; damaged files may have millions
 LONGEST_LINE, LONGEST_NUMBER = 2000, 40
 
+#: last lines whose numbers are compared with the last one; numbers of different forms from which on
+#: the shortest of all is taken for a part of one; lines that end alike from which on they do so by
+#: their format, not by chance (reasoned)
+_COMPARED, _MANY, _FEW = 1001, 100, 20
+
 #: a decimal number in a regular expression; longer runs of digits are no number
 DECIMAL = r"(-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d))"
 
@@ -30,8 +36,8 @@ class Text(NamedTuple):
     """
     A file as lines without their ends.
 
-    Line numbers count from 0 in the code and from 1 in messages. A file whose last line has no end
-    may have been cut inside its last number.
+    Line numbers count from 0 in the code and from 1 in messages. A file may have been cut inside
+    its last number, which its form then shows, the more so where its last line has no end.
     """
 
     name: str
@@ -171,7 +177,7 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
     # A line that is not full lacks a number; padding many of them would fill the memory
     if any(len(row) <= full - width for row in rows[:-1]):
         _refuse_fixed(text, start, rows, samples, width, per_line)
-    if start + len(rows) == len(text.lines) and not text.is_ended:
+    if start + len(rows) == len(text.lines):
         _refuse_short_column(text, rows, width)
     values = _columns(rows, samples, width, full)
     if values is None:
@@ -232,7 +238,7 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
     # Search for the wrong word only when there is one
     if values is None:
         _refuse_free(text, start, rows)
-    if stop is None and not text.is_ended:
+    if stop is None:
         _refuse_another_form(text, rows)
     if samples is not None and len(values) != samples:
         problem = f"the header promises {samples}, the file holds {len(values)}"
@@ -241,19 +247,62 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
 
 
 def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
-    """Refuse a last number that ends at another place of its column than the first one."""
-    first_end = len(rows[0][:width].rstrip())
-    if (len(rows[-1]) - first_end) % width:
+    """Refuse a last number that ends at another place of its column than the others."""
+    if not text.is_ended and (len(rows[-1]) - len(rows[0][:width].rstrip())) % width:
         _refuse_cut(text, f"{rows[-1][-width:]!r} ends before its column")
+    *cells, last = [
+        row[first : first + width].rstrip()
+        for row in rows[-_COMPARED:]
+        for first in range(0, len(row), width)
+    ]
+    # Numbers at the right of their columns all end at one place; at the left, their forms tell
+    ends = {len(cell) for cell in cells}
+    if (len(ends) == 1 and len(last) < min(ends)) or _is_short(last, cells):
+        _refuse_cut(text, f"{last!r} ends before its column")
 
 
 def _refuse_another_form(text: Text, rows: list[str]) -> None:
-    """Refuse a last number that is not written like the last numbers of the other lines."""
-    endings = [row.split()[-1] for row in rows if row.strip()]
+    """Refuse a last number that is not written like those above it, or like those before it."""
+    filled = [row for row in rows if row.strip()]
+    endings = [row.split()[-1] for row in filled]
     forms = {_form(word) for word in endings}
     # Whole numbers have no form that shows their end
-    if len(forms) > 1 or forms == {(-1, 0)}:
+    if not text.is_ended and (len(forms) > 1 or forms == {(-1, 0)}):
         _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
+    # Numbers of the same place in their lines
+    place = len(filled[-1].split()) - 1
+    above = [row for row in filled[-_COMPARED:-1] if len(row.split()) > place]
+    others = [row.split()[place] for row in above] or filled[-1].split()[:-1]
+    if _is_short(endings[-1], others) or _ends_early(filled[-1], above, place):
+        _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
+
+
+def _is_short(word: str, others: list[str]) -> bool:
+    """
+    Check whether a number has fewer decimals or a shorter exponent than every other.
+
+    Where the others have different forms, one of them is the shortest, and may be the last by
+    chance: of ``_MANY`` in a hundredth of the files.
+
+    >>> _is_short("1.2", ["0.25", "1.50"]), _is_short("1.20", ["0.25", "1.50"])
+    (True, False)
+    """
+    forms = {_form(other) for other in others}
+    if len(others) < 2 or (len(forms) > 1 and len(others) < _MANY):
+        return False
+    decimals, exponent = _form(word)
+    fewest, shortest = map(min, zip(*forms, strict=True))
+    return bool(decimals < fewest or exponent < shortest)
+
+
+def _ends_early(row: str, above: list[str], place: int) -> bool:
+    """Check whether the last word of a line ends before the end that all above it share."""
+    words = [[*re.finditer(r"\S+", other)][place] for other in above]
+    # Words of several lengths with one end are in a column
+    ends = {word.end() for word in words}
+    starts = {word.start() for word in words}
+    is_column = len(above) >= _FEW and len(ends) == 1 < len(starts)
+    return is_column and len(row.rstrip()) < min(ends)
 
 
 def _form(word: str) -> tuple[int, int]:
@@ -263,15 +312,18 @@ def _form(word: str) -> tuple[int, int]:
     >>> _form("-1.250E-03"), _form("12."), _form("7")
     ((3, 3), (0, 0), (-1, 0))
     """
-    mantissa, _, exponent = word.upper().partition("E")
+    mantissa, _, exponent = word.strip().upper().partition("E")
     _, point, decimals = mantissa.partition(".")
     return len(decimals) if point else -1, len(exponent)
 
 
 def _refuse_cut(text: Text, problem: str) -> NoReturn:
     """Refuse a file that may have been cut inside its last number."""
-    mend = "get the file again, or end its last line if it is whole"
-    problem = f"{problem}, without an end of line after it: {mend}"
+    if text.is_ended:
+        problem = f"{problem}, unlike the numbers above it: get the file again"
+    else:
+        mend = "get the file again, or end its last line if it is whole"
+        problem = f"{problem}, without an end of line after it: {mend}"
     refuse(text, len(text.lines) - 1, "last number", problem)
 
 

@@ -20,7 +20,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.layers import BLOCK, Geometries, polygons
-from per_obspy.inventory.footprints.neighbours import IntArray, Outlines
+from per_obspy.inventory.footprints.neighbours import Outlines
 
 #: A local projection is true to scale within this range of longitudes, degrees.
 WIDEST_LAYER = 6.0
@@ -140,8 +140,8 @@ def projected(outlines: pa.Array, source: str) -> Projected:
     for block in blocks:
         degrees = polygons(block)
         place.append(shapely.get_coordinates(shapely.centroid(degrees)))
-        boxes.append(shapely.total_bounds(degrees))
-    transformer, central_meridian = _projection(np.array(boxes), source)
+        boxes.append(shapely.bounds(degrees))
+    transformer, central_meridian = _projection(np.concatenate(boxes), source)
     # Boxes and areas in metres
     bounds, area = [], []
     for block in blocks:
@@ -149,16 +149,22 @@ def projected(outlines: pa.Array, source: str) -> Projected:
         bounds.append(shapely.bounds(metres))
         area.append(shapely.area(metres))
 
-    def chosen(numbers: IntArray) -> Geometries:
-        return _in_metres(outlines.take(pa.array(numbers)), transformer)
-
-    near = Outlines(np.concatenate(bounds), chosen)
-    return Projected(near, np.concatenate(place), np.concatenate(area), central_meridian)
+    near = Outlines(
+        np.concatenate(bounds),
+        lambda numbers: _in_metres(outlines.take(pa.array(numbers)), transformer),
+    )
+    # Outlines may go on beyond 180 degrees, places do not
+    centres = np.concatenate(place)
+    centres[centres[:, 0] > 180.0, 0] -= 360.0
+    return Projected(near, centres, np.concatenate(area), central_meridian)
 
 
 def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:
     """Return a transverse Mercator projection about the middle of boxes, and its meridian."""
-    # Around all boxes
+    # Around all boxes; across 180 degrees those to the west of it go on beyond it
+    if np.ptp(boxes[:, ::2]) > 180.0:
+        beyond = boxes[:, 2] < 0.0
+        boxes = np.where(beyond[:, None] & [True, False, True, False], boxes + 360.0, boxes)
     west, south = boxes[:, :2].min(axis=0)
     east, north = boxes[:, 2:].max(axis=0)
     if east - west > WIDEST_LAYER:
@@ -167,6 +173,7 @@ def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, flo
             f"footprints from {west:g} to {east:g} degrees east: split the layer, "
             f"a local projection covers {WIDEST_LAYER:g} degrees",
         )
+    # True to scale along the meridian in their middle
     longitude, latitude = float(west + east) / 2.0, float(south + north) / 2.0
     local = pyproj.CRS.from_dict(
         {"proj": "tmerc", "lon_0": longitude, "lat_0": latitude, "datum": "WGS84"}

@@ -130,6 +130,7 @@ def _true_azimuth(near: Neighbours, found: NearBuildings) -> FloatArray:
     """Return azimuths from true north, degrees: a projection's north turns with the longitude."""
     first = found.buildings.iloc[near.first]
     east = first["longitude"].to_numpy() - found.central_meridian
+    east -= 360.0 * np.round(east / 360.0)
     convergence = east * np.sin(np.deg2rad(first["latitude"].to_numpy()))
     return np.asarray((near.azimuth + convergence) % 360.0)
 

@@ -5,8 +5,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pyogrio.util import vsi_path
-
 
 @contextmanager
 def literal_path(path: Path) -> Iterator[Path]:
@@ -26,6 +24,8 @@ def literal_path(path: Path) -> Iterator[Path]:
     Path
         Absolute.
     """
+    from pyogrio.util import vsi_path  # loads GDAL
+
     place = path.absolute()
     if vsi_path(str(place)) == str(place) and not str(place).startswith("/vsi"):
         yield place

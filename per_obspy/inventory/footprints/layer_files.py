@@ -1,20 +1,29 @@
-"""Files of building footprints: geometries as WKB, attributes and reference system, unchecked."""
+"""
+Files of building footprints: geometries as WKB, attributes and reference system, unchecked.
+
+They are read in a process of their own, with limits of time and memory, each by the reader of its
+suffix if its first bytes are those of such a file. GDAL would choose a driver by the content and
+follow it to other files and addresses.
+"""
 
 import json
+import re
+import sqlite3
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet
-import pyogrio
 import shapely
 from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError, Rejection
+from per_obspy.errors import CatalogError, Rejection, shortened
 from per_obspy.files import unreadable_reason
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.footprints.building_lists import read_list
@@ -22,6 +31,7 @@ from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.inventory.importers.building_files import SUFFIXES, read_buildings
 from per_obspy.inventory.importers.importer import RawLayer as ImportedLayer
 from per_obspy.inventory.importers.nested_columns import without_nesting
+from per_obspy.reader_process import BeyondLimits, Limits, read_layer_apart, require_own_drivers
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow, lists of buildings by the reader of tables.
 GDAL_KINDS = {
@@ -34,6 +44,20 @@ GDAL_KINDS = {
 JSON_SUFFIXES = (".geojson", ".json")
 PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 LIST_SUFFIXES = (".csv",)
+
+#: How files that GDAL reads begin; those of JSON after blanks.
+_BEGINNINGS = {
+    ".gpkg": (b"SQLite format 3\x00",),
+    ".shp": (b"\x00\x00\x27\x0a",),
+    ".fgb": (b"fgb\x03fgb",),
+    **dict.fromkeys(JSON_SUFFIXES, (b"{", b"[")),
+}
+
+#: How SQLite keeps a table that holds its rows, and the index of places of one.
+_TABLE = re.compile(r"\s*CREATE\s+TABLE\b", re.IGNORECASE)
+_PLACES = re.compile(
+    r"""\s*CREATE\s+VIRTUAL\s+TABLE\s+(?:"[^"]*"|\w+)\s+USING\s+"?rtree"?\s*\(""", re.IGNORECASE
+)
 
 #: Longest beginning of a GeoJSON file in which members of the collection are sought, bytes.
 HEAD = 1 << 20
@@ -91,6 +115,31 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     if suffix not in known:
         expected = ", ".join(known)
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
+    if not file.is_file():
+        raise CatalogError(str(file), "is no regular file")
+    if suffix in GDAL_KINDS:
+        _require_beginning(file, GDAL_KINDS[suffix])
+    try:
+        found: RawLayer = read_layer_apart(_limits(file), _read, file, layer)
+    except BeyondLimits as error:
+        raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
+    return found
+
+
+def _limits(file: Path) -> Limits:
+    """
+    Return the limits of reading a layer.
+
+    Reasoned: the areas of OpenStreetMap, the slowest, take 2 s for each MiB of ``.osm.pbf`` and 20
+    times its place in memory.
+    """
+    size = file.stat().st_size
+    return Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
+
+
+def _read(file: Path, layer: str | None) -> RawLayer:
+    """Read a layer in the process of readers."""
+    suffix = file.suffix.lower()
     if (buildings := read_buildings(file)) is not None:
         return raw_features(buildings)
     if suffix in LIST_SUFFIXES:
@@ -104,19 +153,25 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
 
 def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     """Read a layer with GDAL."""
+    import pyogrio  # in the process of readers only
+
     kind = GDAL_KINDS[file.suffix.lower()]
+    require_own_drivers(pyogrio.list_drivers())
     try:
         # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
         with (
             warnings.catch_warnings(action="ignore", category=RuntimeWarning),
-            literal_path(file) as path,
+            _tables_only(file) as (own, views),
+            literal_path(own) as path,
         ):
-            name = _layer_name(file, path, layer)
+            name = _layer_name(file, pyogrio.list_layers(path), layer, views)
             meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False)
     except (
         pyogrio.errors.DataSourceError,
         pyogrio.errors.DataLayerError,
         pa.ArrowException,
+        sqlite3.Error,
+        OSError,
         UnicodeDecodeError,
     ) as error:
         raise CatalogError(str(file), unreadable_reason(file, kind, error)) from error
@@ -126,6 +181,78 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     geometry = table.column_names[-1]
     fields = [str(name) for name in meta["fields"]]
     return _raw_layer(file, table[geometry], table.select(fields), crs)
+
+
+def _require_beginning(file: Path, kind: str) -> None:
+    """Check the first bytes of a file for GDAL, and that no part of it is elsewhere."""
+    suffix = file.suffix.lower()
+    with file.open("rb") as opened:
+        head = opened.read(HEAD)
+    if suffix in JSON_SUFFIXES:
+        head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not head.startswith(_BEGINNINGS[suffix]):
+        text = shortened(head[:20].decode("latin-1"))
+        error = ValueError(f"it begins with {text!r}")
+        raise CatalogError(str(file), unreadable_reason(file, kind, error))
+    # Parts of a file that is here are here too; a folder of links to all parts is one place
+    if suffix == ".shp" and not file.is_symlink():
+        for part in file.parent.iterdir():
+            if part.is_symlink() and part.stem == file.stem:
+                raise CatalogError(
+                    str(file), f"its part {part.name} is a link that leads elsewhere"
+                )
+
+
+@contextmanager
+def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
+    """
+    Yield the place of a layer file, and the views of a GeoPackage, which are not read.
+
+    A view is a search that may be without an end, and a virtual table is a program's: a GeoPackage
+    with such ones is read from a copy without them.
+    """
+    if file.suffix.lower() != ".gpkg":
+        yield file, set()
+        return
+    # Only a package that has some is copied
+    with TemporaryDirectory(prefix="per_obspy_") as folder:
+        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
+            foreign = _views(package)
+            _require_stored(file, package, foreign)
+            copy = Path(folder, "layer.gpkg") if foreign else file
+            if foreign:
+                with closing(sqlite3.connect(copy)) as target:
+                    package.backup(target)
+                    _remove(target, foreign)
+        yield copy, foreign
+
+
+def _views(package: sqlite3.Connection) -> set[str]:
+    """Return the views and virtual tables of a database but for the index of places."""
+    entries = package.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('view', 'table')")
+    return {name for name, sql in entries if sql and not (_TABLE.match(sql) or _PLACES.match(sql))}
+
+
+def _require_stored(file: Path, package: sqlite3.Connection, foreign: set[str]) -> None:
+    """Refuse tables whose columns are computed: by functions that may do anything."""
+    tables = package.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+    for (table,) in tables:
+        columns = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
+        for (column,) in () if table in foreign else package.execute(columns, (table,)):
+            problem = f"column {column} of table {table} is computed, expected a stored one"
+            raise CatalogError(str(file), problem)
+
+
+def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
+    """Remove views and virtual tables, triggers, and the layers that they were."""
+    package.execute("PRAGMA writable_schema = ON")
+    package.execute("DELETE FROM sqlite_master WHERE type = 'trigger'")
+    for name in foreign:
+        package.execute("DELETE FROM sqlite_master WHERE name = ?", (name,))
+    for table in {"gpkg_contents", "gpkg_geometry_columns"} - foreign:
+        tables = "SELECT name FROM sqlite_master WHERE type = 'table'"
+        package.execute(f"DELETE FROM {table} WHERE table_name NOT IN ({tables})")
+    package.commit()
 
 
 def raw_features(buildings: ImportedLayer) -> RawLayer:
@@ -140,7 +267,7 @@ def raw_features(buildings: ImportedLayer) -> RawLayer:
         is_mixed = pd.api.types.infer_dtype(cells, skipna=True).startswith("mixed")
         columns[str(name)] = pa.array(cells.astype(str).where(cells.notna()) if is_mixed else cells)
     numbers = np.arange(1, len(wkb) + 1)
-    return RawLayer(wkb, pa.table(columns), buildings.crs, numbers, buildings.faults)
+    return RawLayer(wkb, pa.table(columns), buildings.crs, numbers, dict(buildings.faults))
 
 
 def _raw_layer(file: Path, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
@@ -191,9 +318,14 @@ def _members(file: Path) -> dict[str, Any]:
     return found
 
 
-def _layer_name(file: Path, path: Path, layer: str | None) -> str:
-    """Return the requested layer of a path, or the only one with geometries."""
-    kinds = {str(name): kind for name, kind in pyogrio.list_layers(path)}
+def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
+    """Return the requested one of the layers and their geometries, or the only one with them."""
+    kinds = {str(name): kind for name, kind in layers}
+    # A view may be what the user means
+    if layer in views or (views and layer is None and not any(kinds.values())):
+        shown = layer or ", ".join(sorted(views))
+        problem = f"layer {shown} is a view, which may have no end: save it as a table"
+        raise CatalogError(str(file), problem)
     if layer is not None:
         if layer not in kinds:
             raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")

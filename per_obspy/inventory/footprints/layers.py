@@ -15,6 +15,7 @@ import pyproj
 import shapely
 from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.footprints.layer_files import RawLayer, read_raw_layer
 
@@ -23,8 +24,8 @@ Geometries = NDArray[np.object_]
 #: Features per block, to bound memory.
 BLOCK = 20_000
 
-#: Largest degrees of longitude and latitude, in the order of bounds.
-_DEGREES = [180.0, 90.0, 180.0, 90.0]
+#: Least and largest degrees of longitude and latitude; outlines across 180 degrees go on beyond it.
+_LOWEST, _HIGHEST = [-180.0, -90.0], [360.0, 90.0]
 
 _POLYGONAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
 _POINTS = {shapely.GeometryType.POINT, shapely.GeometryType.MULTIPOINT}
@@ -38,7 +39,7 @@ class Layer(NamedTuple):
     ----------
     outlines : pa.Array
         WKB of ``n_buildings`` valid polygons and multipolygons, two-dimensional, longitude and
-        latitude in degrees (WGS 84).
+        latitude in degrees (WGS 84); longitudes of one across 180 degrees go on beyond it.
     attributes : DataFrame
         One row per outline; its index is the number of the feature in the file, from 1, or the line
         of a list.
@@ -128,12 +129,26 @@ def _require_outlines(file: Path, raw: RawLayer) -> None:
 
 def in_degrees(original: Geometries, transformer: pyproj.Transformer) -> Geometries:
     """Return geometries in longitude and latitude."""
-    return np.asarray(
+    degrees = np.asarray(
         shapely.transform(
             shapely.force_2d(original),
             lambda xy: np.column_stack(transformer.transform(*xy.T)),
         )
     )
+    # A building across 180 degrees has longitudes of both signs, which would reach around the Earth
+    west, _, east, _ = shapely.bounds(degrees).T
+    for i in np.flatnonzero((east - west > 180.0) & (east - west <= 360.0)).tolist():
+        degrees[i] = shapely.transform(degrees[i], _eastward)
+        parts = shapely.get_parts(degrees[i])
+        # Its parts on both sides, as GeoJSON demands, are one again
+        if len(parts) > 1 and shapely.is_valid(parts).all():
+            degrees[i] = shapely.union_all(parts)
+    return degrees
+
+
+def _eastward(places: FloatArray) -> FloatArray:
+    """Return longitudes and latitudes with longitudes from 0 to 360 degrees."""
+    return np.column_stack([places[:, 0] % 360.0, places[:, 1]])
 
 
 def _checked_block(
@@ -195,7 +210,9 @@ def _are_footprints(degrees: Geometries) -> NDArray[np.bool_]:
 
 def _on_earth(degrees: Geometries | shapely.Geometry) -> NDArray[np.bool_]:
     """Return where coordinates are degrees; a projection gives infinity far outside its range."""
-    return np.asarray((np.abs(shapely.bounds(degrees)) <= _DEGREES).all(axis=-1))
+    bounds = shapely.bounds(degrees)
+    is_inside = (bounds[..., :2] >= _LOWEST) & (bounds[..., 2:] <= _HIGHEST)
+    return np.asarray(is_inside.all(axis=-1))
 
 
 def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None, stray: bool) -> str:

@@ -19,8 +19,9 @@ from per_obspy.inventory.importers.osm_file import read_osm_file
 LINES = (".geojsonl", ".geojsons", ".jsonl", ".ndjson")
 SUFFIXES = (*LINES, ".gml", ".xml", ".pbf", ".osm", ".csv", ".gz")
 
-#: Largest unpacked file, bytes: five million footprints of 800 bytes.
-LARGEST = 4 << 30
+#: Largest unpacked file, bytes: five million footprints of 800 bytes. Largest ratio of it to the
+#: packed file, from 64 MiB on: footprints as text have 5 to 20 (reasoned).
+LARGEST, LARGEST_RATIO, _SMALL = 4 << 30, 200, 64 << 20
 
 _BLOCK = 1 << 20
 
@@ -93,6 +94,9 @@ def _unpacked(file: Path) -> Iterator[Path]:
                     if copy.tell() > LARGEST:
                         limit = f"it has more than {LARGEST >> 30} GiB unpacked"
                         raise CatalogError(str(file), f"{limit}: split the file")
+                    if copy.tell() > max(LARGEST_RATIO * file.stat().st_size, _SMALL):
+                        limit = f"it unpacks to more than {LARGEST_RATIO} times its packed size"
+                        raise CatalogError(str(file), f"{limit}: unpack it by hand")
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise CatalogError(str(file), f"not a file packed by gzip: {error}") from error
         yield plain

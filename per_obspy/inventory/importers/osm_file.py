@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pyogrio
 import shapely
 
 from per_obspy.errors import CatalogError
@@ -47,6 +46,8 @@ def read_osm_file(file: Path, source: str) -> RawLayer:
 
 def _areas(file: Path) -> tuple[dict[str, Any], Any, Any]:
     """Return description, geometries and columns of the buildings of a file."""
+    import pyogrio  # loads GDAL
+
     try:
         return _read(file)
     except pyogrio.errors.FeatureError as error:
@@ -58,6 +59,8 @@ def _areas(file: Path) -> tuple[dict[str, Any], Any, Any]:
 
 def _read(file: Path, **options: str) -> tuple[dict[str, Any], Any, Any]:
     """Read the layer of areas with open options of GDAL."""
+    import pyogrio
+
     with (
         warnings.catch_warnings(action="ignore", category=RuntimeWarning),
         literal_path(file) as path,

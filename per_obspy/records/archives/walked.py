@@ -42,7 +42,7 @@ DAMAGES = (
 )
 
 #: Size of an archive below which its ratio of unpacked to packed bytes is not checked.
-_SMALL = 64 * 2**20
+SMALL = 64 * 2**20
 
 _REPEATED = "another member of this name comes later in the archive"
 
@@ -85,7 +85,7 @@ class Allowance:
         if total > limits.largest_total:
             limit = f"records.archives.largest_total = {limits.largest_total}"
             raise self._too_large(f"unpacks to more than {limit} bytes")
-        if total > max(limits.largest_ratio * self.size, _SMALL):
+        if total > max(limits.largest_ratio * self.size, SMALL):
             limit = f"records.archives.largest_ratio = {limits.largest_ratio:g}"
             raise self._too_large(f"unpacks to more than {limit} times its packed size")
 

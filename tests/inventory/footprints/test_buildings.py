@@ -1,5 +1,7 @@
 """Buildings of a layer, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -9,6 +11,7 @@ import pytest
 import shapely
 
 from per_obspy import pairs_from_footprints
+from per_obspy.errors import CatalogError
 from per_obspy.inventory.footprints import buildings as module
 from per_obspy.inventory.footprints import footprint_rows
 from per_obspy.inventory.footprints.buildings import without_repetitions, write_buildings
@@ -101,3 +104,76 @@ def test_names_of_pairs_that_repeat_in_another_block_are_rejected(tmp_path, monk
     assert pairs["pair_id"].tolist() == ["a/b/c"]
     (rejection,) = pairs.attrs["rejected"]
     assert "occurs in an earlier row already" in rejection.reasons[0]
+
+
+def _across(west: float, east: float) -> list[shapely.Polygon]:
+    """Return three houses in a row of 1e-4 degrees that begins at a longitude, 1e-5 apart."""
+    starts = west + np.arange(3) * 1.1e-4
+    return [shapely.box(x, -17.0, x + (east - west), -16.9999) for x in starts]
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        # Beyond 180 degrees, with both signs, in two parts, and in the convention of 0 to 360
+        lambda xy: xy,
+        lambda xy: np.column_stack([(xy[:, 0] + 180.0) % 360.0 - 180.0, xy[:, 1]]),
+        None,
+        lambda xy: np.column_stack([xy[:, 0] % 360.0, xy[:, 1]]),
+    ],
+    ids=["beyond", "signs", "parts", "turn"],
+)
+def test_a_town_across_the_date_line_is_like_any_other(tmp_path, shape):
+    # Houses of 1e-4 degrees, the second of which lies across 180, and the same ones near 11
+    houses = np.array(_across(179.99985, 179.99995))
+    if shape is None:
+        west, east = shapely.box(0, -90, 180, 90), shapely.box(180, -90, 190, 90)
+        back = shapely.transform(shapely.intersection(houses, east), lambda xy: xy - [360.0, 0.0])
+        moved = [
+            each if shapely.is_empty(other) else (other if shapely.is_empty(each) else each | other)
+            for each, other in zip(shapely.intersection(houses, west), back, strict=True)
+        ]
+    else:
+        moved = [shapely.transform(house, shape) for house in houses]
+    plain = [shapely.transform(house, lambda xy: xy - [169.0, 0.0]) for house in houses]
+    tables = []
+    for name, shapes in (("town", moved), ("plain", plain)):
+        features = [
+            {
+                "type": "Feature",
+                "geometry": json.loads(shapely.to_geojson(shape)),
+                "properties": {"building_id": f"b{n}", "height": 9.0},
+            }
+            for n, shape in enumerate(shapes)
+        ]
+        path = tmp_path / f"{name}.geojson"
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+        tables.append(find_footprint_pairs(path))
+    (pairs, buildings), (expected, _) = tables
+    assert pairs["pair_id"].tolist() == expected["pair_id"].tolist() == ["b0/b1", "b1/b2"]
+    # Figures of coordinates near 180 and near 11 differ by their rounding, 3e-14 degrees or 3 nm
+    for column in ("gap", "facing_length", "area_1", "area_2", "azimuth"):
+        np.testing.assert_allclose(pairs[column], expected[column], rtol=0.0, atol=1e-5)
+    # Places are those of the Earth
+    place, plain_place = (
+        table[["longitude_1", "longitude_2"]].to_numpy() for table in (pairs, expected)
+    )
+    turn = np.where(plain_place + 169.0 > 180.0, 360.0, 0.0)
+    np.testing.assert_allclose(place, plain_place + 169.0 - turn, rtol=0.0, atol=1e-12)
+    assert buildings.table["longitude"].between(-180.0, 180.0).all()
+
+
+def test_towns_far_apart_are_refused_on_both_sides_of_the_date_line(tmp_path):
+    boxes = [shapely.box(x, 50.0, x + 1e-4, 50.0001) for x in (174.0, -175.0)]
+    features = [
+        {
+            "type": "Feature",
+            "geometry": json.loads(shapely.to_geojson(box)),
+            "properties": {"height": 9.0},
+        }
+        for box in boxes
+    ]
+    path = tmp_path / "town.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    with pytest.raises(CatalogError, match="from 174 to 185 degrees east: split the layer"):
+        find_footprint_pairs(path)

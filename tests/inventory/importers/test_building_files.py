@@ -22,6 +22,13 @@ def test_a_bomb_is_refused_before_it_fills_the_disk(tmp_path, monkeypatch):
     path = tmp_path / "a.csv.gz"
     path.write_bytes(gzip.compress(bytes(1 << 24)))
     with pytest.raises(CatalogError, match=r"a\.csv\.gz: it has more than .* split the file"):
+        building_files.read_buildings(path)
+
+
+def test_a_bomb_is_refused_by_its_ratio(tmp_path):
+    path = tmp_path / "a.csv.gz"
+    path.write_bytes(gzip.compress(b"wkt,height\n" + b"0" * (100 << 20)))
+    with pytest.raises(CatalogError, match=r"a\.csv\.gz: it unpacks to more than 200 times"):
         pairs_from_footprints(path)
 
 
