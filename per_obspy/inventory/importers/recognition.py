@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.errors import CatalogError, did_you_mean
+from per_obspy.inventory.cells import NOTES, read_numbers
 from per_obspy.inventory.importers.class_heights import with_class_heights
 from per_obspy.inventory.importers.importer import Importer
 from per_obspy.inventory.importers.sources.gem import GEM
@@ -35,8 +36,8 @@ IMPORTERS = (
     OWN,
 )
 
-#: Quantities of which a layer must give one.
-_SIZES = ("height", "storeys", "period")
+#: Quantities of which a layer must give one, and the one that makes heights of storeys.
+_SIZES, _STOREY = ("height", "storeys", "period"), "storey_height"
 
 
 def recognised(names: Iterable[str]) -> Importer:
@@ -83,6 +84,7 @@ def imported(
     adapted = importer.adapted(attributes)
     table = _named(adapted, importer, given or {})
     names = set(adapted.columns)
+    table, notes, placeholders = _with_sizes(table)
     # A layer needs one size at least
     sizes = table[[name for name in _SIZES if name in table]]
     if sizes.columns.empty or (len(sizes) and sizes.isna().all(axis=None)):
@@ -93,8 +95,31 @@ def imported(
     # Missing heights from the classes of the layer
     if importer.class_column is not None:
         unknown = pd.Series("", adapted.index)
-        table = with_class_heights(table, adapted.get(importer.class_column, unknown))
+        classes = adapted.get(importer.class_column, unknown)
+        table = with_class_heights(table, classes, (notes == "").to_numpy())
+    sizes = table[[name for name in _SIZES if name in table]].isna().all(axis=1).to_numpy()
+    for row, note in placeholders.items():
+        if sizes[row] and not notes.iloc[row]:
+            notes.iloc[row] = note
+    if (notes != "").any():
+        table[NOTES] = notes
     return table.join(adapted[[name for name in importer.carried if name in names]])
+
+
+def _with_sizes(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.Series, dict[int, str]]:
+    """Return sizes as numbers, notes on the cells of each row, and placeholders by row."""
+    notes: list[list[str]] = [[] for _ in range(len(table))]
+    placeholders = dict[int, str]()
+    for name in (*_SIZES, _STOREY):
+        if name in table:
+            numbers = read_numbers(name, table[name])
+            table[name] = numbers.values
+            for row, note in numbers.notes.items():
+                notes[row].append(note)
+            for row, number in numbers.placeholders.items():
+                placeholders[row] = f"{name} = {number:g} is a placeholder, not a size"
+    texts = pd.Series(["; ".join(said) for said in notes], table.index, dtype=object)
+    return table, texts, placeholders
 
 
 def _named(

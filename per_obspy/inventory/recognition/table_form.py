@@ -6,7 +6,6 @@ one every form that can be is tried, and the one whose headings mean most column
 """
 
 import csv
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -105,7 +104,7 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     meanings = meanings_of(best.cells, given, str(file))
     lines = encodings[best.encoding] or check_text(file, best.encoding)
     is_western = best.encoding == "cp1252" and TURKISH_PAGE in encodings
-    is_doubtful = is_western and not _language(meanings)
+    is_doubtful = is_western and not meanings.language
     return best._replace(meanings=meanings, lines=lines, is_doubtful=is_doubtful)
 
 
@@ -116,15 +115,8 @@ def _is_plain(form: TextForm) -> bool:
 
 def _rank(form: TextForm) -> tuple[int, bool]:
     """Return the criteria between forms: columns, and Turkish words in the Turkish code page."""
-    is_turkish = form.encoding == TURKISH_PAGE and _language(form.meanings) == "tr"
+    is_turkish = form.encoding == TURKISH_PAGE and form.meanings.language == "tr"
     return len(form.meanings.columns), is_turkish
-
-
-def _language(meanings: Meanings) -> str:
-    """Return the language of most headings, empty if they are English or of none."""
-    languages = Counter(heading.language for heading in meanings.columns.values())
-    del languages[""], languages["en"]
-    return languages.most_common(1)[0][0] if languages else ""
 
 
 def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> Iterator[TextForm]:

@@ -102,20 +102,27 @@ def test_a_comma_inside_quotes_is_no_separator(write):
 
 def test_text_in_a_column_of_numbers_is_named_with_its_row(write):
     bad = GOOD.replace("0.05", "five").replace("007", "008")
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD}\n{bad}\n"))
+    assert pairs["cell_notes"].tolist() == ["", "gap = 'five' is not a number"]
+    # A place is needed, a gap is not
+    place = pairs["longitude_1"][0]
+    bad = GOOD.replace(f",{place:g},", ",east,").replace("007", "008")
     (rejection,) = read_pairs(write(f"{HEADER}\n{GOOD}\n{bad}\n")).attrs["rejected"]
     assert rejection[:4] == ("pair", "008", str(rejection.source), 3)
-    assert rejection.reasons == ("gap = 'five' is not a number",)
+    assert rejection.reasons == ("longitude_1 = 'east' is not a number",)
 
 
 def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
     table = pd.DataFrame(
-        {"pair_id": ["a"], "gap": ["1,5"], "longitude_1": [1.0], "latitude_1": [1.0]}
+        {"pair_id": ["a"], "gap": ["wide"], "longitude_1": [1.0], "latitude_1": [1.0]}
     )
     table = table.assign(longitude_2=1.0, latitude_2=1.0, height_1=3.0, height_2=3.0)
     table.to_parquet(tmp_path / "pairs.parquet")
+    assert read_pairs(tmp_path / "pairs.parquet")["gap"].isna().tolist() == [True]
+    table.assign(latitude_1="north").to_parquet(tmp_path / "pairs.parquet")
     pairs = read_pairs(tmp_path / "pairs.parquet")
     assert pairs.empty
-    assert pairs.attrs["rejected"][0].reasons == ("gap = '1,5' is not a number",)
+    assert pairs.attrs["rejected"][0].reasons == ("latitude_1 = 'north' is not a number",)
 
 
 ROW = f"{HEADER}\n{GOOD}\n"
