@@ -41,6 +41,10 @@ _FILL = 1e19
 #: A gap that is estimated by eye is between half of it and one and a half (reasoned).
 ABOUT = 0.5
 
+#: Where other gaps have a unit, a number without one is in doubt from here on, m (reasoned: gaps
+#: in m are hardly wider, and those in cm are hardly a smaller number).
+DOUBTFUL = 0.3
+
 #: Standard deviation over width of an even distribution, as gaps in a range have it (reasoned).
 EVEN = 1.0 / np.sqrt(12.0)
 
@@ -259,7 +263,8 @@ def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
             number = float(plain_word(plain) in words("yes"))
     if number is None:
         return wrong
-    if bare == "gap" and form.gap_unit and number and not re.search(r"[^\d\s.,eE+-]", plain):
+    has_unit = bool(re.search(r"[^\d\s.,eE+-]", plain))
+    if bare == "gap" and form.gap_unit and number >= DOUBTFUL and not has_unit:
         doubt = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
         return Value(np.nan, note=doubt)
     # As it is written, without its unit
@@ -375,7 +380,7 @@ def _bound(name: str, text: str, form: CellForm) -> float | None:
     """Return a number of an inexact gap; None where it lacks the unit that other cells have."""
     number = _quantity(name, text, form)
     has_unit = bool(re.search(r"[^\d\s.,+-]", text))
-    return None if form.gap_unit and number and not has_unit else number
+    return None if number and form.gap_unit and number >= DOUBTFUL and not has_unit else number
 
 
 def _both(name: str, first: str, second: str, form: CellForm) -> tuple[float, float] | None:

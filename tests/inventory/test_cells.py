@@ -133,8 +133,8 @@ def test_no_gap_is_wider_than_it_is_said(number, form):
 
 def test_a_number_without_the_unit_of_the_others_is_in_doubt():
     # 3 is 3 cm here, or 3 m by the schema: neither is taken
-    read = read_numbers("gap", pd.Series(["5 cm", "3", "0", "2-4", "~1", "30 mm"]))
-    assert_allclose(read.values, [0.05, np.nan, 0.0, np.nan, np.nan, 0.03])
+    read = read_numbers("gap", pd.Series(["5 cm", "3", "0", "2-4", "~1", "30 mm", "0.05"]))
+    assert_allclose(read.values, [0.05, np.nan, 0.0, np.nan, np.nan, 0.03, 0.05])
     assert read.notes[1] == "gap = '3' has no unit, as other cells have (cm)"
     assert set(read.notes) == {1, 3, 4}
     # but under a heading with a unit it is that

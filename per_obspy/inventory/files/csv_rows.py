@@ -65,7 +65,9 @@ class CsvFile:
         self.file, self._given, self._language = file, given, language
         form = text_form(file, given)
         self._form = form
-        self._layout = Layout(form.lines, form.header, form.separator, form.encoding)
+        self._layout = Layout(
+            form.lines, form.header, form.separator, form.encoding, form.header_end
+        )
         self.headings = header_names(file, self._layout)
         self.meanings = form.meanings
         self._columns = [given_text(name.strip()) for name in form.meanings.names]

@@ -52,6 +52,8 @@ class TextForm(NamedTuple):
         Of its cells.
     lines : int
         Number of lines of the file.
+    header_end : int
+        Last line of the header, whose cells may have line breaks.
     is_doubtful : bool
         Whether another encoding would give other letters, and no heading decides.
     """
@@ -62,6 +64,7 @@ class TextForm(NamedTuple):
     cells: tuple[str, ...]
     meanings: Meanings
     lines: int = 0
+    header_end: int = 0
     is_doubtful: bool = False
 
     def sentence(self) -> str:
@@ -125,9 +128,9 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
     for encoding in encodings:
         head = _first_lines(file, encoding)
         for separator in separators:
-            for number, cells in _headers(head, separator):
+            for number, end, cells in _headers(head, separator):
                 found = meanings_of(cells, given, str(file), must_have=False)
-                form = TextForm(encoding, separator, number, tuple(cells), found)
+                form = TextForm(encoding, separator, number, tuple(cells), found, header_end=end)
                 # Any bytes may be Japanese: only a heading decides
                 if encoding != JAPANESE or given.encoding or found.has_language("ja"):
                     yield form
@@ -147,12 +150,26 @@ def _first_lines(file: Path, encoding: str) -> list[str]:
     return text.split("\n")[:HEADER_LINES]
 
 
-def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the lines that may be a header, with their cells."""
+def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, list[str]]]:
+    """Yield first and last line of what may be a header, with its cells."""
     for number, line in enumerate(lines, 1):
-        try:
-            cells = next(csv.reader([line], delimiter=separator, strict=True), [])
-        except csv.Error:
-            cells = [line] if number == 1 else []
+        # A cell with line breaks ends on a later line
+        end, text = number, line
+        while (cells := _strict_cells(text, separator)) is None and end < len(lines):
+            text, end = f"{text}\n{lines[end]}", end + 1
+            if '"' not in line:
+                break
+        if cells is None:
+            end, cells = number, [line] if number == 1 else []
         if cells and (number == 1 or len(cells) >= _FEWEST):
-            yield number, [cell.strip() for cell in cells]
+            yield number, end, [" ".join(cell.split()) for cell in cells]
+
+
+def _strict_cells(text: str, separator: str) -> list[str] | None:
+    """Return the cells of a row, None if its quotation marks are wrong."""
+    try:
+        return next(
+            csv.reader(text.splitlines(keepends=True), delimiter=separator, strict=True), []
+        )
+    except csv.Error:
+        return None

@@ -6,6 +6,7 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from per_obspy import read_pairs
+from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.files.reading import PairInventory
 
@@ -98,6 +99,23 @@ def test_a_comma_inside_quotes_is_no_separator(write):
     row = GOOD.replace("corner shop", '"shop, corner"')
     pairs = read_pairs(write(f"{HEADER}\n{row}\n"))
     assert pairs.loc[0, "note"] == "shop, corner"
+
+
+def test_cells_with_line_breaks_are_read_and_every_line_is_counted(tmp_path):
+    # as spreadsheets write headings of two lines; a bad row after them has its own line
+    path = tmp_path / "pares.csv"
+    path.write_text(
+        '"Nombre\ndel par","Separación\n(cm)",Longitud 1,Latitud 1,Altura 1,'
+        "Longitud 2,Latitud 2,Altura 2,Notas\n"
+        '"a\nb",5,1,1,9,1,1,9,"two\nlines"\n'
+        'c,"3\n-5 cm",1,1,9,1,1,9,x\n'
+        "d,5,east,1,9,1,1,9,x\n"
+    )
+    pairs = read_pairs(path, TableForm(columns={"pair_id": "Nombre del par"}))
+    assert pairs["pair_id"].tolist() == ["a b", "c"]
+    assert pairs["gap"].tolist() == pytest.approx([0.05, 0.04])
+    assert pairs["Notas"].tolist() == ["two lines", "x"]
+    assert [(row.row, row.name) for row in pairs.attrs["rejected"]] == [(7, "d")]
 
 
 def test_text_in_a_column_of_numbers_is_named_with_its_row(write):
