@@ -196,9 +196,7 @@ def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
     if as_json:
         known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
-        if "cell_notes" in table:
-            noted = table.loc[table["cell_notes"] != "", ["pair_id", "cell_notes"]]
-            known["doubtful"] = noted.to_dict("records")
+        known["doubtful"] = _noted(table).to_dict("records")
         print(json.dumps({**counts, **known, "suspicions": odd, **found}))
         return
     # People first learn how the table is read
@@ -235,13 +233,18 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
 
 
+def _noted(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the pairs with a note on their cells, none if the table has no notes."""
+    notes = table.reindex(columns=["pair_id", "cell_notes"]).fillna("")
+    return notes[notes["cell_notes"] != ""]
+
+
 def _print_doubtful(table: "pd.DataFrame") -> None:
     """Print the first notes on cells that were not understood or are no exact value."""
-    if "cell_notes" not in table:
-        return
-    noted = table.loc[table["cell_notes"] != "", ["pair_id", "cell_notes"]]
+    noted = _noted(table)
     if noted.empty:
         return
+    # Some of them as examples
     print(f"{len(noted)} rows with a doubtful cell, which are screened:")
     for name, note in noted.head(SHOWN).itertuples(index=False):
         print(printable(f"  {name}: {note}"))

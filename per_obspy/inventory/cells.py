@@ -8,7 +8,7 @@ text goes to the column ``cell_notes``.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -183,33 +183,42 @@ def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> N
     >>> read_numbers("height_1", pd.Series(["6 m", "20 ft", "-9999", "?"])).values.round(3)
     array([6.   , 6.096,   nan,   nan])
     """
-    count, unit = len(cells), form.units.get(name)
     is_truth = pd.api.types.is_bool_dtype(cells.dtype) and name == OBSERVED
     if is_number(cells) or is_truth:
-        raw = cells.to_numpy(dtype=np.float64, na_value=np.nan)
-        values = raw if unit is None else raw * unit.numerator / unit.denominator
-        is_none = placeholders(name, raw, values)
-        rows = np.flatnonzero(is_none).tolist()
-        lost = {row: float(values[row]) for row in rows}
-        return Numbers(np.where(is_none, np.nan, values), np.zeros(count), {}, lost)
+        return _plain(name, cells.to_numpy(dtype=np.float64, na_value=np.nan), form)
     # Each text once: a table has few different ones
-    texts = cells.astype(str).mask(cells.isna(), "")
-    codes, distinct = pd.factorize(texts)
-    if bare_name(name) == "gap" and not form.gap_unit and unit is None:
-        form = form._replace(gap_unit=unit_in_cells(distinct))
-    read = [read_number(name, text, form) for text in distinct]
-    columns = np.array([(one.number, one.deviation) for one in read], dtype=float).reshape(-1, 2)
-    notes, lost = dict[int, str](), dict[int, float]()
-    for code, one in enumerate(read):
-        if one.note or one.is_placeholder:
-            rows = np.flatnonzero(codes == code).tolist()
-            if one.is_placeholder:
-                lost |= dict.fromkeys(rows, one.number)
-            else:
-                notes |= dict.fromkeys(rows, one.note)
-    values, deviations = columns[codes].T
-    values[list(lost)] = np.nan
-    return Numbers(values, deviations, dict(sorted(notes.items())), lost)
+    codes, texts = pd.factorize(cells.astype(str).mask(cells.isna(), ""))
+    if bare_name(name) == "gap" and not form.gap_unit and name not in form.units:
+        form = form._replace(gap_unit=unit_in_cells(texts))
+    read = [read_number(name, text, form) for text in texts]
+    # Back to the rows
+    numbers = np.array([one.number for one in read], dtype=float)
+    deviations = np.array([one.deviation for one in read], dtype=float)
+    is_none = np.array([one.is_placeholder for one in read], dtype=bool)
+    notes = _by_row(codes, [one.note for one in read])
+    return _without(numbers[codes], is_none[codes])._replace(
+        deviations=deviations[codes], notes=notes
+    )
+
+
+def _without(values: FloatArray, is_none: NDArray[np.bool_]) -> Numbers:
+    """Return exact numbers without those that mean nothing."""
+    # These are kept, as a message may need them
+    lost = {row: float(values[row]) for row in np.flatnonzero(is_none).tolist()}
+    return Numbers(np.where(is_none, np.nan, values), np.zeros(values.size), {}, lost)
+
+
+def _plain(name: str, raw: FloatArray, form: CellForm) -> Numbers:
+    """Return numbers of a column in the unit of the schema."""
+    unit = form.units.get(name)
+    values = raw if unit is None else raw * unit.numerator / unit.denominator
+    return _without(values, placeholders(name, raw, values))
+
+
+def _by_row(codes: NDArray[np.int64], notes: Sequence[str]) -> dict[int, str]:
+    """Return the notes by row, from those of the different texts."""
+    has_note = np.array([note != "" for note in notes], dtype=bool)
+    return {row: notes[codes[row]] for row in np.flatnonzero(has_note[codes]).tolist()}
 
 
 def placeholders(name: str, raw: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
@@ -223,6 +232,7 @@ def placeholders(name: str, raw: FloatArray, values: FloatArray) -> NDArray[np.b
     raw, values : (n,) ndarray
         As they are written, and in the unit of the schema.
     """
+    # Positions have none, and gaps fewer
     bare = bare_name(name)
     column = COLUMNS.get(name) or COLUMNS.get(f"{name}_1")
     if column is not None and column.required and bare != "gap":
@@ -249,29 +259,43 @@ def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
     plain = text.translate(_FULL_WIDTH).strip()
     if is_unknown(plain):
         return Value(np.nan)
-    wrong = Value(np.nan, note=f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number")
     if len(plain) > LONGEST:
-        return wrong
-    bare, mark = bare_name(name), form.marks.get(name, "")
-    if bare == "storeys":
-        number = _storeys(plain, form.language, mark)
-    elif (number := _quantity(name, plain, form)) is None:
-        # Words and inexact numbers
-        if bare == "gap":
-            return _inexact(name, text.strip(), plain, form) or wrong
-        if bare == OBSERVED and plain_word(plain) in {**words("yes"), **words("no")}:
-            number = float(plain_word(plain) in words("yes"))
+        return _wrong(name, text)
+    number = _exact(name, plain, form)
     if number is None:
-        return wrong
-    has_unit = bool(re.search(r"[^\d\s.,eE+-]", plain))
-    if bare == "gap" and form.gap_unit and number >= DOUBTFUL and not has_unit:
-        doubt = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
-        return Value(np.nan, note=doubt)
+        inexact = _inexact(name, text.strip(), plain, form) if bare_name(name) == "gap" else None
+        return inexact or _wrong(name, text)
+    # A gap whose unit is in doubt
+    if _lacks_unit(name, plain, number, form):
+        note = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
+        return Value(np.nan, note=note)
     # As it is written, without its unit
     digits = _NUMBER.fullmatch(plain)
-    raw = np.array([(_decimal(digits[1], mark) or number) if digits else number])
-    is_none = bool(placeholders(name, raw, np.array([number]))[0])
-    return Value(number, is_placeholder=is_none)
+    raw = _decimal(digits[1], form.marks.get(name, "")) if digits else None
+    is_none = placeholders(name, np.array([raw or number]), np.array([number]))
+    return Value(number, is_placeholder=bool(is_none[0]))
+
+
+def _wrong(name: str, text: str) -> Value:
+    """Return the meaning of a text that is not understood."""
+    note = f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number"
+    return Value(np.nan, note=note)
+
+
+def _exact(name: str, text: str, form: CellForm) -> float | None:
+    """Return the number that a text is in its column, None if it is none."""
+    if bare_name(name) == "storeys":
+        return _storeys(text, form.language, form.marks.get(name, ""))
+    answer = plain_word(text)
+    if name == OBSERVED and answer in {**words("yes"), **words("no")}:
+        return float(answer in words("yes"))
+    return _quantity(name, text, form)
+
+
+def _lacks_unit(name: str, text: str, number: float, form: CellForm) -> bool:
+    """Return whether a gap has no unit where others have one, and its size does not tell it."""
+    has_unit = bool(re.search(r"[^\d\s.,eE+-]", text))
+    return bool(form.gap_unit) and name == "gap" and number >= DOUBTFUL and not has_unit
 
 
 def unit_in_cells(texts: "pd.Series | NDArray[np.object_]") -> str:
@@ -335,10 +359,15 @@ def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
         return Value(0.0)
     if (limited := _limited(name, text, word, form)) is not None:
         return limited
+    return _ranged(name, text, word, form)
+
+
+def _ranged(name: str, text: str, word: str, form: CellForm) -> Value | None:
+    """Return a gap between two numbers or with a deviation, None if it is none."""
     if found := _PLUS_MINUS.fullmatch(word):
-        # The unit may be behind both
         ends = _both(name, found[1], found[2], form)
         return ends and _noted(name, text, ends[0], ends[1], "")
+    # Words between blanks, signs anywhere
     for separator in words("to"):
         sign = re.escape(separator)
         sign = rf"\s+{sign}\s+" if separator.isalpha() and separator.isascii() else rf"\s*{sign}\s*"
@@ -352,10 +381,11 @@ def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
 def _limited(name: str, text: str, word: str, form: CellForm) -> Value | None:
     """Return a gap that is an estimate or a limit, None if it is none."""
     for kind in ("about", "below", "above"):
-        for inner in _without(word, kind):
+        for inner in _inner(word, kind):
             number = _bound(name, inner, form)
             if number is None or number < 0.0:
                 continue
+            # The ends of what it may be
             if kind == "above":
                 return _noted(name, text, number, 0.0, "the least it may be")
             low = number * (1.0 - ABOUT) if kind == "about" else 0.0
@@ -363,9 +393,10 @@ def _limited(name: str, text: str, word: str, form: CellForm) -> Value | None:
     return None
 
 
-def _without(word: str, kind: str) -> Iterator[str]:
+def _inner(word: str, kind: str) -> Iterator[str]:
     """Yield a text without each word of a kind that is at its beginning or end."""
     for sign in words(kind):
+        # No part of a longer word
         is_word = sign[-1].isalpha() and sign.isascii()
         start = rf"{re.escape(sign)}{r'(?![a-z])' if is_word else ''}[\s.]*(.+)"
         end = (
@@ -379,12 +410,12 @@ def _without(word: str, kind: str) -> Iterator[str]:
 def _bound(name: str, text: str, form: CellForm) -> float | None:
     """Return a number of an inexact gap; None where it lacks the unit that other cells have."""
     number = _quantity(name, text, form)
-    has_unit = bool(re.search(r"[^\d\s.,+-]", text))
-    return None if number and form.gap_unit and number >= DOUBTFUL and not has_unit else number
+    return None if number is None or _lacks_unit(name, text, number, form) else number
 
 
 def _both(name: str, first: str, second: str, form: CellForm) -> tuple[float, float] | None:
     """Return two numbers, of which the first may have the unit of the second."""
+    # The unit may be behind both
     unit = next((unit for _, unit in _measures(name, second)), None)
     inner = form if unit is None else form._replace(units={**form.units, name: unit}, gap_unit="")
     ends = _bound(name, first, inner), _bound(name, second, form)
@@ -411,13 +442,18 @@ def _storeys(text: str, language: str, mark: str) -> float | None:
 
     A comma is decimal only before a 0, or before a 5 in a column of decimal commas.
     """
-    # Basements, one ground floor, and the floors above it; words for a storey behind numbers
     word = plain_word(text)
     parts = [_without_storey(part.strip()) for part in word.split("+")]
     if found := _STOREYS.fullmatch(parts[0] if len(parts) == 1 else word):
         return float(found[0].replace(",", ".")) if mark == "," or ",5" not in word else None
+    return _floors(parts, language)
+
+
+def _floors(parts: Sequence[str], language: str) -> float | None:
+    """Return the floors of a code: basements, one ground floor, and those above it."""
     codes = [re.sub(r"^\d+\s*|\s*\d+$", "", part) for part in parts]
     ground = [code for code in codes if code in words("ground")]
+    # A code of two kinds needs the language
     sure = [code for code in ground if code not in words("basement")]
     sure = sure or [code for code in ground if language in words("ground")[code]]
     others = {code for code in codes[:-1] if code not in sure}
@@ -445,6 +481,7 @@ def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
     cells : Series
         Anything; structural systems and answers may be words of several languages.
     """
+    # Blanks and words for an empty cell
     column = COLUMNS[name]
     texts = cells.astype(str).str.strip().mask(cells.isna(), "").reset_index(drop=True)
     empty = EMPTY if name in ("pair_id", NOTES) else EMPTY | words("unknown").keys()
@@ -453,23 +490,24 @@ def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
         return texts, {}
     # Each text once
     codes, distinct = pd.factorize(texts)
-    chosen = [
-        text if not text or text in column.choices else _chosen(column, text) for text in distinct
+    chosen = [_chosen(column, text) for text in distinct]
+    allowed = ", ".join(column.choices)
+    notes = [
+        f"{name} = {shortened(text, LONGEST)!r} is unknown, expected {allowed}"
+        if word is None
+        else ""
+        for word, text in zip(chosen, distinct, strict=True)
     ]
-    notes = dict[int, str]()
-    for code, (word, text) in enumerate(zip(chosen, distinct, strict=True)):
-        if word is None:
-            allowed = ", ".join(column.choices)
-            note = f"{name} = {shortened(text, LONGEST)!r} is unknown, expected {allowed}"
-            notes |= dict.fromkeys(np.flatnonzero(codes == code).tolist(), note)
-    return texts.map({text: word or "" for text, word in zip(distinct, chosen, strict=True)}), notes
+    meanings = {text: word or "" for text, word in zip(distinct, chosen, strict=True)}
+    return texts.map(meanings), _by_row(codes, notes)
 
 
 def _chosen(column: Column, text: str) -> str | None:
     """Return the choice that a text means, "" if it is unknown, None if it means none of them."""
     word = plain_word(text)
-    if word in words("unknown"):
+    if not word or word in words("unknown"):
         return ""
+    # Answers, and structural systems
     meant = word if word in column.choices else named("system").get(word, "")
     if set(column.choices) == {"yes", "no"}:
         meant = next((answer for answer in column.choices if word in words(answer)), "")
@@ -485,7 +523,7 @@ def read_columns(
     Parameters
     ----------
     columns : mapping of str to Series
-        Of one table, by the names of the schema; others are returned as they are.
+        Of one table, by the names of the schema.
     form : CellForm, optional
         Of the table.
 
@@ -496,38 +534,44 @@ def read_columns(
         value adds its deviation to ``gap_std``. A placeholder is empty if the building has another
         size, and stays what it is otherwise.
     """
-    read, notes = dict[str, pd.Series](), dict[int, list[str]]()
-    found = dict[str, Numbers]()
+    read, notes = dict[str, pd.Series](), list[dict[int, str]]()
+    numbers = dict[str, Numbers]()
+    # Column by column
     for name, cells in columns.items():
-        if name not in COLUMNS:
-            read[name] = cells.reset_index(drop=True)
-        elif COLUMNS[name].dtype == "str":
+        if COLUMNS[name].dtype == "str":
             read[name], wrong = read_texts(name, cells)
-            _add_notes(notes, wrong)
+            notes.append(wrong)
         else:
-            found[name] = numbers = read_numbers(name, cells, form)
-            read[name] = pd.Series(numbers.values)
-            _add_notes(notes, numbers.notes)
+            numbers[name] = read_numbers(name, cells, form)
+            read[name] = pd.Series(numbers[name].values)
+            notes.append(numbers[name].notes)
+    # Values that rest on several columns
     for group in ONE_OF:
-        _add_notes(notes, _without_size(read, found, group))
-    # The deviation of inexact gaps
-    if "gap" in found and found["gap"].deviations.any():
-        given = read.get("gap_std", pd.Series(np.nan, read["gap"].index))
-        both = np.hypot(given.fillna(0.0), found["gap"].deviations)
-        read["gap_std"] = given.where(found["gap"].deviations == 0.0, both)
-    if notes:
-        before = read.get(NOTES, pd.Series("", next(iter(read.values())).index, dtype=object))
-        texts = before.astype(object).tolist()
-        for row, said in notes.items():
-            texts[row] = "; ".join([*([texts[row]] if texts[row] else []), *said])
-        read[NOTES] = pd.Series(texts, dtype=object)
-    return read
+        notes.append(_without_size(read, numbers, group))
+    if "gap" in numbers and (deviations := numbers["gap"].deviations).any():
+        read["gap_std"] = _joined(read.get("gap_std"), deviations)
+    return _with_notes(read, notes)
 
 
-def _add_notes(notes: dict[int, list[str]], more: Mapping[int, str]) -> None:
-    """Add the notes of a column to those of the rows."""
-    for row, note in more.items():
-        notes.setdefault(row, []).append(note)
+def _joined(given: pd.Series | None, deviations: FloatArray) -> pd.Series:
+    """Return deviations of gaps, m, with those of inexact cells as independent errors."""
+    exact = pd.Series(np.nan, range(deviations.size)) if given is None else given
+    return exact.where(deviations == 0.0, np.hypot(exact.fillna(0.0), deviations))
+
+
+def _with_notes(
+    read: dict[str, pd.Series], notes: Sequence[Mapping[int, str]]
+) -> dict[str, pd.Series]:
+    """Add the notes of all columns to the column of notes, which tables without one need not."""
+    if not any(notes):
+        return read
+    # Behind those that the table has already
+    before = read.get(NOTES, pd.Series("", next(iter(read.values())).index))
+    texts = before.astype(object).tolist()
+    for column in notes:
+        for row, note in column.items():
+            texts[row] = f"{texts[row]}; {note}" if texts[row] else note
+    return read | {NOTES: pd.Series(texts, dtype=object)}
 
 
 def _without_size(

@@ -117,6 +117,7 @@ def row_names(table: pd.DataFrame, lines: NDArray[np.int64], prefix: str = "") -
     prefix : str, optional
         What names the file, where an inventory has several.
     """
+    # Names as they are given, and numbers for the others
     empty = pd.Series("", index=range(len(table)), dtype=object)
     names = read_texts("pair_id", table["pair_id"])[0] if "pair_id" in table else empty
     missing = np.flatnonzero(names == "")
@@ -141,7 +142,7 @@ def check_columns(names: Sequence[str], source: str) -> None:
     missing = [name for name in required if name not in names]
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
-        found = ", ".join(names)
+        found = ", ".join(names) or "none"
         suggestion = did_you_mean(missing[0], set(names) - set(COLUMNS))
         absent = ", ".join(missing)
         raise CatalogError(

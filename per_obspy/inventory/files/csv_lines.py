@@ -128,6 +128,7 @@ def header_names(file: Path, layout: Layout) -> list[str]:
     CatalogError
         If a quotation mark of the line is not closed.
     """
+    # Cells of the header may have line breaks
     lines = next(_after_lines(file, layout, layout.header - 1)).split(b"\n")
     first = b" ".join(lines[: layout.last - layout.header + 1])
     patterns = _patterns(layout.separator)

@@ -181,6 +181,7 @@ class CsvFile:
         Rows of pairs have values by the schema; others have text where a cell is no number.
         """
         for rows in _regrouped(self._blocks(self.names), size):
+            # Numbers and texts as far as they are plain, then values
             full = _has_content(rows.table)
             cells = {name: self._converted(name, rows.table[name]) for name in self.names}
             table = pa.table(cells).filter(pa.array(full))

@@ -84,6 +84,7 @@ def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
 
 def with_values(table: pa.Table, form: CellForm) -> pa.Table:
     """Return a table whose columns of numbers are numbers in the units of the schema."""
+    # Text is left to the checks
     known = [name for name in table.column_names if name in COLUMNS]
     chosen = [name for name in known if COLUMNS[name].dtype != "str" or name == NOTES]
     read = read_columns({name: table[name].to_pandas() for name in chosen}, form)
@@ -111,6 +112,7 @@ def cell_form(
     marks : mapping of str to str
         Column -> decimal mark.
     """
+    # Units of headings, those of the schema too, and configured ones
     units = {means.column: means.unit for means in meanings.columns.values() if means.unit}
     units |= meanings.units
     gap_unit = ""

@@ -125,9 +125,9 @@ def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
 
 def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     """Check a pair table that is in memory already."""
-    check_columns([str(name) for name in table], "table")
     if table.empty:
         raise CatalogError("table", "the table has no rows")
+    check_columns([str(name) for name in table], "table")
     return checked_pairs(table.reset_index(drop=True), "table")
 
 

@@ -88,6 +88,7 @@ def _given(attributes: pd.DataFrame, names: Mapping[str, str], source: str) -> d
                 f"{did_you_mean(column, known)}",
             )
         given[name] = attributes[column]
+    # An empty cell is no name of a system
     if "system" in given:
         given["system"] = given["system"].fillna("").astype(str)
     return given

@@ -147,6 +147,7 @@ def _with_heights(table: pd.DataFrame) -> pd.DataFrame:
     unknown = pd.Series(np.nan, index=table.index)
     for i in (1, 2):
         if f"storey_height_{i}" in table:
+            # A given height comes first
             storeys, height = (table.get(f"{name}_{i}", unknown) for name in ("storeys", "height"))
             table[f"height_{i}"] = height.fillna(storeys * table.pop(f"storey_height_{i}"))
     return table
@@ -170,6 +171,7 @@ def _without_overlaps(
 ) -> tuple[pd.DataFrame, list[Rejection]]:
     """Return the pairs without overlaps, and a rejection for each other."""
     faults = dict(_overlaps(found.near.rows(rows), table))
+    # One reason at most
     rejected = []
     for row, reason in faults.items():
         name = str(table["pair_id"].iloc[row])

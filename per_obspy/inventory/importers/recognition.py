@@ -85,10 +85,8 @@ def imported(
     table = _named(adapted, importer, given or {})
     names = set(adapted.columns)
     table, notes, placeholders = _with_sizes(table)
-    # A layer needs one size at least
-    sizes = table[[name for name in _SIZES if name in table]]
-    if sizes.columns.empty or (len(sizes) and sizes.isna().all(axis=None)):
-        raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
+    _require_sizes(attributes, table, importer, source, notes)
+    # Names of systems and buildings
     if "system" not in table and (systems := _systems(adapted, importer)) is not None:
         table["system"] = systems
     table["building_id"] = _identifiers(table)
@@ -97,17 +95,40 @@ def imported(
         unknown = pd.Series("", adapted.index)
         classes = adapted.get(importer.class_column, unknown)
         table = with_class_heights(table, classes, (notes == "").to_numpy())
-    sizes = table[[name for name in _SIZES if name in table]].isna().all(axis=1).to_numpy()
-    for row, note in placeholders.items():
-        if sizes[row] and not notes.iloc[row]:
-            notes.iloc[row] = note
-    if (notes != "").any():
-        table[NOTES] = notes
+    table = _with_notes(table, notes, placeholders)
     return table.join(adapted[[name for name in importer.carried if name in names]])
+
+
+def _with_notes(
+    table: pd.DataFrame, notes: pd.Series, placeholders: Mapping[int, str]
+) -> pd.DataFrame:
+    """Return the table with notes on cells, and on placeholders of buildings without a size."""
+    lost = _sizes(table).isna().all(axis=1).to_numpy() & (notes == "").to_numpy()
+    # By position
+    texts = notes.tolist()
+    for row in placeholders.keys() & set(np.flatnonzero(lost).tolist()):
+        texts[row] = placeholders[row]
+    return table.assign(**{NOTES: texts}) if any(texts) else table
+
+
+def _sizes(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the columns of sizes that a table has."""
+    return table[[name for name in _SIZES if name in table]]
+
+
+def _require_sizes(
+    attributes: pd.DataFrame, table: pd.DataFrame, importer: Importer, source: str, notes: pd.Series
+) -> None:
+    """Raise CatalogError if a layer has no size of any building, not even one to be quoted."""
+    sizes = _sizes(table)
+    is_empty = len(sizes) and sizes.isna().all(axis=None) and (notes == "").all()
+    if sizes.columns.empty or is_empty:
+        raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
 
 
 def _with_sizes(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.Series, dict[int, str]]:
     """Return sizes as numbers, notes on the cells of each row, and placeholders by row."""
+    # By row: what was not understood, and numbers that mean nothing
     notes: list[list[str]] = [[] for _ in range(len(table))]
     placeholders = dict[int, str]()
     for name in (*_SIZES, _STOREY):

@@ -67,6 +67,7 @@ class Meanings(NamedTuple):
     def sentence(self) -> str:
         """Return the columns that are renamed or in other units as one text, empty if none is."""
         texts = []
+        # In the order of the schema
         for name in COLUMNS:
             heading, unit = self.renamed.get(name), self.units.get(name)
             if heading or unit:

@@ -115,7 +115,7 @@ def test_cells_with_line_breaks_are_read_and_every_line_is_counted(tmp_path):
     assert pairs["pair_id"].tolist() == ["a b", "c"]
     assert pairs["gap"].tolist() == pytest.approx([0.05, 0.04])
     assert pairs["Notas"].tolist() == ["two lines", "x"]
-    assert [(row.row, row.name) for row in pairs.attrs["rejected"]] == [(7, "d")]
+    assert [(row.row, row.name) for row in pairs.attrs["rejected"]] == [(9, "d")]
 
 
 def test_text_in_a_column_of_numbers_is_named_with_its_row(write):

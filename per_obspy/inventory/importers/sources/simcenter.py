@@ -38,6 +38,7 @@ def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
     name = next((name for name in ("Height", "height") if name in attributes), None)
     if name is None:
         return attributes
+    # Each building in the unit of its file
     unknown = pd.Series("", attributes.index)
     units = attributes.get(LENGTH_UNIT, unknown).astype(str).str.strip().str.lower()
     heights = read_numbers("height", attributes[name]).values
