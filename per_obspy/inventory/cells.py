@@ -8,7 +8,7 @@ text goes to the column ``cell_notes``.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -188,7 +188,7 @@ def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> N
         return _plain(name, cells.to_numpy(dtype=np.float64, na_value=np.nan), form)
     # Each text once: a table has few different ones
     codes, texts = pd.factorize(cells.astype(str).mask(cells.isna(), ""))
-    if bare_name(name) == "gap" and not form.gap_unit and name not in form.units:
+    if name == "gap" and not form.gap_unit and name not in form.units:
         form = form._replace(gap_unit=unit_in_cells(texts))
     read = [read_number(name, text, form) for text in texts]
     # Back to the rows
@@ -298,7 +298,7 @@ def _lacks_unit(name: str, text: str, number: float, form: CellForm) -> bool:
     return bool(form.gap_unit) and name == "gap" and number >= DOUBTFUL and not has_unit
 
 
-def unit_in_cells(texts: "pd.Series | NDArray[np.object_]") -> str:
+def unit_in_cells(texts: Iterable[object]) -> str:
     """Return a unit other than m that texts of gaps have, empty if none has one."""
     for text in texts:
         for _, unit in _measures("gap", str(text).translate(_FULL_WIDTH)[: LONGEST + 1]):

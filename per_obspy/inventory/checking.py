@@ -123,7 +123,8 @@ def row_names(table: pd.DataFrame, lines: NDArray[np.int64], prefix: str = "") -
     missing = np.flatnonzero(names == "")
     if missing.size:
         names = names.astype(object)
-        names.iloc[missing] = [f"{prefix}row {lines[row]}" for row in missing]
+        numbers = [f"{prefix}row {lines[row]}" for row in missing.tolist()]
+        names.iloc[missing.tolist()] = pd.Index(numbers)
     return names.set_axis(table.index)
 
 
@@ -200,7 +201,7 @@ def _missing(column: Column, read: Mapping[str, pd.Series]) -> list[Fault]:
     return [(i, _noted(read, i, (column.name,)) or f"{column.name} is empty") for i in rows]
 
 
-def _noted(columns: Mapping[str, pd.Series], row: int, names: Sequence[str]) -> str:
+def _noted(columns: pd.DataFrame | Mapping[str, pd.Series], row: int, names: Sequence[str]) -> str:
     """Return the notes on some cells of a row, empty if there are none."""
     notes = columns[NOTES].iloc[row].split("; ") if NOTES in columns else []
     return "; ".join(note for note in notes if note.partition(" = ")[0] in names)
