@@ -8,7 +8,7 @@ from pandas.testing import assert_frame_equal
 from per_obspy import read_pairs
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.files.reading import PairInventory
+from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note"
 GOOD = "007,0.05,-67.95,-20.35,12,-67.9501,-20.35,9.5,corner shop"
@@ -193,3 +193,31 @@ def test_missing_file_and_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(CatalogError, match="no such file"):
         read_pairs(tmp_path / "folder.csv")
+
+
+def test_a_table_without_names_is_named_by_its_rows_and_says_so(tmp_path):
+    rows = (
+        "Boşluk (cm),Boylam 1,Enlem 1,Kat 1,Boylam 2,Enlem 2,Kat 2,Bina 1 Adı,Taşıyıcı sistem 1\n"
+    )
+    rows = rows.replace("Boşluk", "Derz") + (
+        "bitişik,29,41,Z+4,29,41,5,Ev,Betonarme\n3-5,29,41,3+1,29,41,5,Okul,Yığma\n"
+        "?,29,41,B+Z+3,29,41,5,Cami,taş\n"
+    )
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(rows)
+    pairs = read_pairs(tmp_path / "a.csv")
+    assert "no pair_id: each pair is named by its row, as 'row 2'" in pairs.attrs["recognised"]
+    assert pairs["pair_id"].tolist() == ["row 2", "row 4"]
+    assert pairs["building_id_1"].tolist() == ["Ev", "Cami"]
+    assert pairs["system_1"].tolist() == ["concrete_mrf", "other"]
+    assert pairs["storeys_1"].tolist() == [5.0, 5 - 1]
+    assert pairs["gap"].tolist()[0] == 0.0
+    assert pairs["gap"].isna().tolist()[1]
+    (lost,) = pairs.attrs["rejected"]
+    assert (lost.name, lost.row) == ("row 3", 3)
+    assert "storeys_1 = '3+1' is not a number" in lost.reasons[0]
+    # Several files of one inventory
+    chunks = PairInventory([tmp_path / "a.csv", tmp_path / "b.csv"]).chunks(2)
+    tables = [checked_chunk(chunk) for chunk in chunks]
+    names = [name for table in tables for name in table["pair_id"]]
+    assert names == ["a row 2", "a row 4", "b row 2", "b row 4"]
