@@ -353,11 +353,14 @@ ROWS = {
         "gap = 50 m is outside 0 to 10 m (given in millimetres or centimetres by mistake?)",
     ),
     "negative gap": ({"gap": -0.05}, "gap = -0.05 m is outside"),
-    "text for a gap": ({"gap": "five"}, "gap = 'five' is not a number"),
-    "decimal comma": ({"gap": "0,05"}, "gap = '0,05' is not a number"),
+    "text for a place": ({"longitude_1": "x"}, "longitude_1 = 'x' is not a number"),
     "height of 0": ({"height_1": 0}, "height_1 = 0 m is outside"),
     "no height": ({"height_2": ""}, "none of height_2, storeys_2, period_2 is a number"),
-    "period of 0": ({"period_1": 0}, "period_1 = 0 s is outside"),
+    "period of 1 ms": ({"period_1": 0.001}, "period_1 = 0.001 s is outside"),
+    "storeys that are a list": (
+        {"height_1": "", "storeys_1": "3;4"},
+        "none of height_1, storeys_1, period_1 is a number, one is needed: storeys_1 = '3;4'",
+    ),
     "period in milliseconds": (
         {"period_2": 500},
         "period_2 = 500 s is outside 0.01 to 20 s (in milliseconds?)",
@@ -369,7 +372,6 @@ ROWS = {
         "damping_1 = 5 is outside 0 to 1 (a fraction is expected, not per cent)",
     ),
     "28 m floor": ({"storeys_1": 1, "height_1": 28}, "makes floors of 28 m"),
-    "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown"),
     "same name": ({"pair_id": "a"}, "pair_id = 'a' occurs in an earlier row"),
     "same building": (
         {"building_id_1": "h", "building_id_2": "h"},
@@ -402,6 +404,38 @@ def test_a_run_lists_every_wrong_row_and_judges_the_others(write, call, tmp_path
     assert rejected.index.tolist() == list(range(3, 3 + len(ROWS)))
     for reason, (_, message) in zip(rejected, ROWS.values(), strict=True):
         assert message in reason
+
+
+#: Cells that are not needed: their text, and what the row becomes.
+NOT_NEEDED = {
+    "text for a gap": ({"gap": "five"}, "gap = 'five' is not a number", "unknown"),
+    "a range": ({"gap": "0.03-0.05"}, "gap = '0.03-0.05' is read as 0.04 m, with a devi", ""),
+    "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown", ""),
+    "text for an azimuth": ({"azimuth": "north"}, "azimuth = 'north' is not a number", ""),
+}
+
+
+def test_a_cell_that_is_not_needed_is_told_and_its_row_is_screened(write, call, tmp_path):
+    # among small chunks and plain rows: parts with and without notes make one table
+    rows = [{"pair_id": name} | row for name, (row, _, _) in NOT_NEEDED.items()]
+    write({"pairs.csv": _table({}, {"pair_id": "bitişik", "gap": "bitişik"}, *rows)})
+    code, out, _ = call("pairs", "check", "pairs.csv")
+    assert code == 0
+    assert "pairs.csv: 6 usable pairs, 1 of them touching, 0 rejected rows" in out
+    assert f"{len(rows)} rows with a doubtful cell, which are screened:" in out
+    write_simulation(simulate(Scenario(stations=1, dt=0.02)), tmp_path / "records")
+    assert call("run", "run.toml")[0] == 0
+    risk = pd.read_csv("out/risk.csv", keep_default_na=False).set_index("pair_id")
+    for name, (_, note, state) in NOT_NEEDED.items():
+        assert note in out
+        assert note in risk.loc[name, "cell_notes"]
+        assert "doubtful_cell" in risk.loc[name, "flags"].split()
+        assert (risk.loc[name, "state"] == "unknown") == (state == "unknown")
+    assert "doubtful_cell" not in risk.loc["bitişik", "flags"]
+    assert risk.loc["bitişik", "gap"] in ("0", "0.0", 0.0)
+    # an even distribution between both ends
+    assert float(risk.loc["a range", "gap"]) == pytest.approx(0.04)
+    assert float(risk.loc["a range", "gap_std"]) == pytest.approx(0.02 / 12**0.5, rel=1e-3)
 
 
 def test_a_pair_without_a_gap_is_kept(write, call, tmp_path):
@@ -453,7 +487,7 @@ def test_every_fault_of_a_row_is_told(write, call):
     write(
         {
             "pairs.csv": _table(
-                {}, {"pair_id": "b", "gap": 50, "height_1": 0, "mass_2": -1, "restitution": 2}
+                {}, {"pair_id": "b", "gap": 50, "height_1": 0, "mass_2": -2, "restitution": 2}
             )
         }
     )

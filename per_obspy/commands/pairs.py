@@ -196,6 +196,7 @@ def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
     if as_json:
         known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
+        known["doubtful"] = _noted(table).to_dict("records")
         print(json.dumps({**counts, **known, "suspicions": odd, **found}))
         return
     # People first learn how the table is read
@@ -204,6 +205,7 @@ def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     counted = f"{counts['pairs']} usable pairs, {counts['touching']} of them touching"
     print(f"{file}: {counted}, {len(rejected)} rejected rows")
     _print_rejected(rejected)
+    _print_doubtful(table)
     if not table.empty:
         _print_profile(table)
     for suspicion in odd:
@@ -229,6 +231,25 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
         faults = faults_by_column(rejected)
         counts = ", ".join(f"{fault} ({count})" for fault, count in faults.items())
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
+
+
+def _noted(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the pairs with a note on their cells, none if the table has no notes."""
+    notes = table.reindex(columns=["pair_id", "cell_notes"]).fillna("")
+    return notes[notes["cell_notes"] != ""]
+
+
+def _print_doubtful(table: "pd.DataFrame") -> None:
+    """Print the first notes on cells that were not understood or are no exact value."""
+    noted = _noted(table)
+    if noted.empty:
+        return
+    # Some of them as examples
+    print(f"{len(noted)} rows with a doubtful cell, which are screened:")
+    for name, note in noted.head(SHOWN).itertuples(index=False):
+        print(printable(f"  {name}: {note}"))
+    if len(noted) > SHOWN:
+        print(f"  and {len(noted) - SHOWN} more: column cell_notes of the result")
 
 
 def _print_profile(table: "pd.DataFrame") -> None:

@@ -6,7 +6,7 @@ Each check works on whole columns. A row with a fault becomes a
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Self
 from unicodedata import category
 
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
-from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
+from per_obspy.inventory.cells import NOTES, read_columns, read_texts
+from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
 from per_obspy.inventory.table_columns import numbers_in
 
 #: Height of one storey, m: a hall may have 12 m, but 28 m is a mistake in height or storeys.
@@ -32,9 +33,6 @@ CONTACT_TOLERANCE = 1e-3
 
 #: Longest name of a column, characters.
 LONGEST_NAME = 200
-
-#: The only column of numbers that may hold truth values: whether pounding was seen.
-OBSERVED = "observed"
 
 #: Position of a row in the table, and the reason for its rejection.
 Fault = tuple[int, str]
@@ -92,7 +90,7 @@ def checked_pairs(
     if lines is None:
         lines = np.arange(2, len(table) + 2)
     # Convert every cell and collect every fault of every row
-    pairs, faults = _converted(table)
+    pairs, faults = _converted(table.assign(pair_id=row_names(table, lines)))
     identifiers = pairs["pair_id"]
     faults += _duplicates(identifiers, identifiers.duplicated() if repeated is None else repeated)
     for check in _CHECKS:
@@ -104,6 +102,30 @@ def checked_pairs(
     accepted = pairs[~is_faulty].reset_index(drop=True)
     accepted.attrs["rejected"] = Rejections(rejected)
     return accepted
+
+
+def row_names(table: pd.DataFrame, lines: NDArray[np.int64], prefix: str = "") -> pd.Series:
+    """
+    Return the identifiers of pairs, the number of its row where a pair has none.
+
+    Parameters
+    ----------
+    table : DataFrame
+        With or without the column ``pair_id``.
+    lines : (n_rows,) ndarray of int
+        Line of each row in its file.
+    prefix : str, optional
+        What names the file, where an inventory has several.
+    """
+    # Names as they are given, and numbers for the others
+    empty = pd.Series("", index=range(len(table)), dtype=object)
+    names = read_texts("pair_id", table["pair_id"])[0] if "pair_id" in table else empty
+    missing = np.flatnonzero(names == "")
+    if missing.size:
+        names = names.astype(object)
+        numbers = [f"{prefix}row {lines[row]}" for row in missing.tolist()]
+        names.iloc[missing.tolist()] = pd.Index(numbers)
+    return names.set_axis(table.index)
 
 
 def check_columns(names: Sequence[str], source: str) -> None:
@@ -121,7 +143,7 @@ def check_columns(names: Sequence[str], source: str) -> None:
     missing = [name for name in required if name not in names]
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
-        found = ", ".join(names)
+        found = ", ".join(names) or "none"
         suggestion = did_you_mean(missing[0], set(names) - set(COLUMNS))
         absent = ", ".join(missing)
         raise CatalogError(
@@ -150,15 +172,15 @@ def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     Columns come in the order of the schema, numbers as float64 and text stripped; unknown columns
     follow unchanged.
     """
-    known = [name for name in COLUMNS if name in table.columns]
-    data: dict[str, pd.Series | FloatArray] = {}
+    read = read_columns({name: table[name] for name in COLUMNS if name in table.columns})
+    known = [name for name in COLUMNS if name in read]
     faults: list[Fault] = []
-    # Known columns as the schema has them
     for name in known:
-        read = _texts if COLUMNS[name].dtype == "str" else _numbers
-        data[name], found = read(COLUMNS[name], table[name])
-        faults += found
+        faults += _missing(COLUMNS[name], read)
+        if COLUMNS[name].dtype != "str":
+            faults += _out_of_range(COLUMNS[name], read[name].to_numpy())
     # Unknown columns as they are
+    data = {name: read[name] for name in known}
     for name in table.columns.difference(known, sort=False):
         data[name] = table[name].reset_index(drop=True)
     return pd.DataFrame(data), faults
@@ -170,62 +192,19 @@ def _rows(mask: ArrayLike) -> list[int]:
     return rows
 
 
-def _is_empty(values: pd.Series) -> NDArray[np.bool_]:
-    """Return where cells are missing or contain a word for an empty cell."""
-    text = values.astype(str).str.strip().str.lower()
-    return np.asarray(values.isna() | text.isin(EMPTY), dtype=bool)
-
-
-def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
-    """Return stripped text, "" in empty cells, and the faults of missing or unknown texts."""
-    empty = _is_empty(values)
-    text = values.astype(str).str.strip().mask(empty, "").reset_index(drop=True)
-    faults = _missing(column, empty)
-    if column.choices:
-        # Texts that are not among the choices of the schema
-        allowed = ", ".join(column.choices)
-        for i in _rows(~text.isin([*column.choices, ""])):
-            reason = f"{column.name} = {text.iloc[i]!r} is unknown, expected {allowed}"
-            faults.append((i, reason))
-    return text, faults
-
-
-def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]]:
-    """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
-    # Cells that were read as numbers; `observed` may be true or false
-    is_truth = pd.api.types.is_bool_dtype(values.dtype)
-    if is_number(values) or (is_truth and column.name == OBSERVED):
-        number = values.to_numpy(dtype=np.float64, na_value=np.nan)
-        return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
-    # Cells that are still text
-    empty = _is_empty(values)
-    converted = plain_numbers(values.mask(empty))
-    number = converted.to_numpy(dtype=np.float64, na_value=np.nan)
-    wrong = _rows(np.isnan(number) & ~empty)
-    faults = [(i, f"{column.name} = {str(values.iloc[i])!r:.40} is not a number") for i in wrong]
-    return number, faults + _missing(column, empty) + _out_of_range(column, number)
-
-
-def is_number(values: pd.Series) -> bool:
-    """Return whether a column's type is that of real numbers: truth values and dates are none."""
-    kind = values.dtype
-    is_other = pd.api.types.is_bool_dtype(kind) or pd.api.types.is_complex_dtype(kind)
-    return pd.api.types.is_numeric_dtype(kind) and not is_other
-
-
-def plain_numbers(values: pd.Series) -> pd.Series:
-    """Return cells as numbers, NaN where they are none; truth values and dates are none."""
-    if is_number(values):
-        return values
-    # As text, as pandas takes dates for nanoseconds and truth values for 0 and 1
-    return pd.to_numeric(values.astype(str).mask(values.isna()), errors="coerce")
-
-
-def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:
-    """Return a fault for each empty cell of a column that every row needs."""
+def _missing(column: Column, read: Mapping[str, pd.Series]) -> list[Fault]:
+    """Return a fault for each cell without a value in a column that every row needs."""
     if not column.required or column.may_be_empty:
         return []
-    return [(i, f"{column.name} is empty") for i in _rows(empty)]
+    values = read[column.name]
+    rows = _rows(values.isna() | (values == ""))
+    return [(i, _noted(read, i, (column.name,)) or f"{column.name} is empty") for i in rows]
+
+
+def _noted(columns: pd.DataFrame | Mapping[str, pd.Series], row: int, names: Sequence[str]) -> str:
+    """Return the notes on some cells of a row, empty if there are none."""
+    notes = columns[NOTES].iloc[row].split("; ") if NOTES in columns else []
+    return "; ".join(note for note in notes if note.partition(" = ")[0] in names)
 
 
 def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
@@ -254,7 +233,9 @@ def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
     for group in ONE_OF:
         known = [~np.isnan(numbers_in(pairs, name)) for name in group]
         for i in _rows(~np.any(known, axis=0)):
-            yield i, f"none of {', '.join(group)} is a number, one is needed"
+            reason = f"none of {', '.join(group)} is a number, one is needed"
+            notes = _noted(pairs, i, group)
+            yield i, f"{reason}: {notes}" if notes else reason
 
 
 def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:

@@ -74,7 +74,8 @@ class Column(NamedTuple):
 TINY = 1e-4
 
 _PAIR = (
-    Column("pair_id", "str", "", "identifier of the pair, unique in its file", required=True),
+    Column("pair_id", "str", "",
+           "identifier of the pair, unique in its file; the number of its row where there is none"),
     Column("gap", "float64", "m",
            "clear distance between the buildings at the contact height, 0 if they touch; empty if "
            "unknown",
@@ -107,6 +108,9 @@ _PAIR = (
     Column("observed", "float64", "1",
            "1 if pounding was seen in the event, 0 if looked for and not seen",
            low=0.0, high=1.0),
+    Column("cell_notes", "str", "",
+           "cells of the row that were not understood and are left empty, and gaps that are read "
+           "from a range, an estimate or a limit"),
 )  # fmt: skip
 
 _BUILDING = (

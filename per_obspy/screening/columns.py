@@ -282,6 +282,10 @@ FLAGS: dict[str, str] = {
         "the pair table gives no gap: the demand is the gap needed; probability, state and impacts "
         "are empty, or those of the gap that the configuration assumes"
     ),
+    "doubtful_cell": (
+        "a cell of the pair table was not understood and is left empty, or a gap is a range, an "
+        "estimate or a limit: see cell_notes"
+    ),
     "touching": "gap 0: the single hit is outside its reliable range",
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"

@@ -36,8 +36,14 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
     gap = values(table, "gap")
     # Tables that are computed for a screening have a gap in every row, and a mark
     unknown = table["unknown_gap"] if "unknown_gap" in table else np.isnan(gap)
+    # A table without a doubtful cell has no notes, or none in some of its parts
+    notes = table["cell_notes"] if "cell_notes" in table else gap  # noqa: SIM401, as no mapping
+    has_note = np.array(
+        [isinstance(note, str) and note != "" for note in np.asarray(notes).tolist()], bool
+    )
     return {
         "unknown_gap": np.asarray(unknown, dtype=bool),
+        "doubtful_cell": has_note,
         "touching": gap == 0.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),

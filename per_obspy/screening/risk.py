@@ -6,6 +6,8 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Building, Screening
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.checking import check_columns
 from per_obspy.screening.ground_motion.assignment import stations_of
 from per_obspy.screening.ground_motion.site_motion import (
     RegionalMotion,
@@ -50,9 +52,14 @@ def risk_table(
     ------
     TypeError
         If an argument is of another type.
+    CatalogError
+        If the pairs lack a column that every pair needs, as an empty DataFrame does.
     """
     datasets = _datasets(spectra)
     _require("pairs", pairs, pd.DataFrame, "a DataFrame from read_pairs")
+    check_columns([str(name) for name in pairs], "pairs")
+    if "pair_id" not in pairs:
+        raise CatalogError("pairs", "missing column pair_id: read_pairs names rows without one")
     _require("building", building, Building, "a Building")
     _require("screening", screening, Screening, "a Screening")
     stations, unlocated = stations_of(datasets)

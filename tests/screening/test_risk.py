@@ -1,12 +1,14 @@
 """Risk table: no pair missing, every number at contact height, the ladder of demands, ranking."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from screening_samples import make_pairs, make_station
 
 import per_obspy
 from per_obspy.config import Screening
+from per_obspy.errors import CatalogError
 from per_obspy.screening.columns import ORDER
 
 
@@ -258,3 +260,15 @@ def test_an_argument_of_another_type_is_named(station, argument, value, message)
     arguments = {"spectra": station, "pairs": make_pairs([{}])} | {argument: value}
     with pytest.raises(TypeError, match=message):
         per_obspy.risk_table(**arguments)
+
+
+def test_pairs_without_columns_are_refused_by_their_names(station):
+    # would catch an IndexError far behind the argument
+    with pytest.raises(CatalogError, match="pairs: missing column gap, longitude_1"):
+        per_obspy.risk_table(station, pd.DataFrame())
+    with pytest.raises(CatalogError, match="pairs: missing column pair_id"):
+        per_obspy.risk_table(station, make_pairs([{}]).drop(columns="pair_id"))
+    with pytest.raises(CatalogError, match="table: the table has no rows"):
+        per_obspy.read_pairs(pd.DataFrame())
+    # A table whose rows were all rejected has no rows, and that is its result
+    assert per_obspy.risk_table(station, make_pairs([{}]).iloc[:0]).empty

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.cells import is_unknown, read_number
 from per_obspy.inventory.recognition.csv_text import UTF_8, text_blocks
-from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 #: Most lines of one row; a quotation over more of them is one that is not closed.
 LONGEST_ROW = 100
@@ -62,11 +62,13 @@ def _patterns(separator: str) -> _Patterns:
     # Cells, and the characters that may follow them
     cell = rb'(?:"%b"|[^"%b][^%b]*+|)' % (_INSIDE, sign, sign)
     cells = rb"(?:%b%b)*+" % (sign, cell)
+    # Before a further quotation the last of them is given back
+    some = rb"(?:%b%b)*" % (sign, cell)
     return _Patterns(
         whole=re.compile(rb"%b%b" % (cell, cells)),
         opening=re.compile(rb'(?:%b%b)*+"%b' % (cell, sign, _INSIDE)),
         closing=re.compile(rb'%b"%b' % (_INSIDE, cells)),
-        between=re.compile(rb'%b(?:"%b%b"%b)?+' % (_INSIDE, cells, sign, _INSIDE)),
+        between=re.compile(rb'%b(?:"%b%b"%b)?+' % (_INSIDE, some, sign, _INSIDE)),
     )
 
 
@@ -98,7 +100,9 @@ class Layout(NamedTuple):
     lines : int
         Number of lines of the file.
     header : int
-        Line of the header.
+        Line of the header, whose cells may have line breaks too.
+    header_end : int
+        Line on which it ends, 0 if that is the same.
     separator, encoding : str
         Of the text.
     """
@@ -107,6 +111,12 @@ class Layout(NamedTuple):
     header: int = 1
     separator: str = ","
     encoding: str = UTF_8
+    header_end: int = 0
+
+    @property
+    def last(self) -> int:
+        """Last line of the header."""
+        return max(self.header, self.header_end)
 
 
 def header_names(file: Path, layout: Layout) -> list[str]:
@@ -118,7 +128,9 @@ def header_names(file: Path, layout: Layout) -> list[str]:
     CatalogError
         If a quotation mark of the line is not closed.
     """
-    first = next(_after_lines(file, layout, layout.header - 1)).partition(b"\n")[0]
+    # Cells of the header may have line breaks
+    lines = next(_after_lines(file, layout, layout.header - 1)).split(b"\n")
+    first = b" ".join(lines[: layout.last - layout.header + 1])
     patterns = _patterns(layout.separator)
     if not patterns.whole.fullmatch(first):
         problem = OPEN if patterns.opening.fullmatch(first) else AFTER
@@ -145,7 +157,7 @@ def row_lines(file: Path, names: Sequence[str], layout: Layout) -> Iterator[RowL
         If the lines that were read are not those that the file had.
     """
     scanner = _Scanner(file, names, layout)
-    for block in _after_lines(file, layout, layout.header):
+    for block in _after_lines(file, layout, layout.last):
         yield scanner.rows(block)
     yield scanner.rows(b"", is_last=True)
     if scanner.number != layout.lines + 1:
@@ -167,7 +179,7 @@ class _Scanner:
     """
 
     def __init__(self, file: Path, names: Sequence[str], layout: Layout) -> None:
-        self.number = layout.header + 1
+        self.number = layout.last + 1
         self._file, self._names = file, names
         self._separator, self._patterns = layout.separator, _patterns(layout.separator)
         # Lines of a row that goes on in the next block
@@ -206,33 +218,31 @@ class _Scanner:
         for count, line in enumerate(islice(self._waiting, 1, LONGEST_ROW), start=2):
             if self._patterns.closing.fullmatch(line):
                 return self._closed(list(islice(self._waiting, count)))
-            if self._is_row(line) or not self._patterns.between.fullmatch(line):
+            if self._begins_again(first, line) or not self._patterns.between.fullmatch(line):
                 return 1, OPEN
         return (1, OPEN) if is_last or len(self._waiting) >= LONGEST_ROW else None
 
     def _closed(self, lines: list[bytes]) -> tuple[int, str]:
         """Return how many of the lines of a closed quotation are the next row, and its fault."""
         cells = _cells(b"\n".join(lines), self._separator)
-        named = dict(zip(self._names, cells, strict=False))
-        # Only carried columns have text of several lines
-        wrong = [name for name, cell in named.items() if "\n" in cell and name in COLUMNS]
-        if len(cells) == len(self._names) and wrong:
-            return len(lines), f"{wrong[0]} has a line break"
-        if len(cells) != len(self._names) or self._is_row(lines[-1]):
+        if len(cells) != len(self._names) or self._begins_again(lines[0], lines[-1]):
             return 1, OPEN
         return len(lines), ""
+
+    def _begins_again(self, first: bytes, line: bytes) -> bool:
+        """Return whether a line is a row of its own, and none that goes on with a first line."""
+        # A line that closes the first cell of a row has all others too
+        has_all = first.count(self._separator.encode()) >= len(self._names) - 1
+        return (has_all or b'"' not in line) and self._is_row(line)
 
     def _is_row(self, line: bytes) -> bool:
         """Return whether a line inside quotation marks is a row by itself, judged by its gap."""
         if line.count(self._separator.encode()) < len(self._names) - 1:
             return False
         cells = dict(zip(self._names, _cells(line, self._separator), strict=False))
-        # A number, with either decimal mark, or an empty cell
-        gap = cells.get("gap", "no row").replace(",", ".")
-        try:
-            return gap.strip().lower() in EMPTY or float(gap) == float(gap)
-        except ValueError:
-            return False
+        # A number, with either decimal mark, or a word, but no text
+        gap = cells.get("gap", "no row")
+        return is_unknown(gap) or not np.isnan(read_number("gap", gap.replace(",", ".")).number)
 
     def _rejection(self, line: bytes, fault: str) -> Rejection:
         """Return the rejection of the next line."""

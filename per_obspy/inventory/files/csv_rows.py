@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.cells import CellForm, bare_name
 from per_obspy.inventory.files.csv_lines import (
     LONGEST_NAME,
     Layout,
@@ -25,8 +26,10 @@ from per_obspy.inventory.files.csv_lines import (
     header_names,
     row_lines,
 )
-from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
+from per_obspy.inventory.files.raw_rows import RawRows, cell_form, with_values
 from per_obspy.inventory.files.text_cells import given_text, given_texts
+from per_obspy.inventory.gap_units import GAP
+from per_obspy.inventory.recognition.column_meanings import IDENTIFIER
 from per_obspy.inventory.recognition.decimal_marks import (
     evidence_of,
     has_quoted_commas,
@@ -36,7 +39,6 @@ from per_obspy.inventory.recognition.decimal_marks import (
 )
 from per_obspy.inventory.recognition.encodings import TURKISH, two_pages
 from per_obspy.inventory.recognition.table_form import text_form
-from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 #: The default: the form of a table is recognised, not configured.
@@ -55,13 +57,17 @@ class CsvFile:
         Text of any form that :func:`~.table_form.text_form` recognises.
     given : TableForm
         Form of the table as configured by the user.
+    language : str
+        Of headings that had other names before; empty if it is that of the header.
     """
 
-    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
-        self.file, self._given = file, given
+    def __init__(self, file: Path, given: TableForm = PLAIN, language: str = "") -> None:
+        self.file, self._given, self._language = file, given, language
         form = text_form(file, given)
         self._form = form
-        self._layout = Layout(form.lines, form.header, form.separator, form.encoding)
+        self._layout = Layout(
+            form.lines, form.header, form.separator, form.encoding, form.header_end
+        )
         self.headings = header_names(file, self._layout)
         self.meanings = form.meanings
         self._columns = [given_text(name.strip()) for name in form.meanings.names]
@@ -95,7 +101,7 @@ class CsvFile:
         if self._layout.separator != ",":
             return
         # Decimal commas between commas make more cells, in every row
-        first = next(self._blocks([IDENTIFIER]))
+        first = next(self._blocks(self.names[:1]))
         counts = [
             re.match(r"(\d+) columns, the header has", row.reasons[0]) for row in first.broken
         ]
@@ -163,34 +169,44 @@ class CsvFile:
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
-        for block in self._blocks([IDENTIFIER]):
-            yield given_texts(block.table.column(0)).combine_chunks()
+        is_named = IDENTIFIER in self.names
+        for block in self._blocks([IDENTIFIER] if is_named else self.names[:1]):
+            names = given_texts(block.table.column(0)).combine_chunks()
+            yield names if is_named else pa.nulls(len(names), pa.string())
 
-    def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows in plain units; lines without any content are left out."""
+    def rows(self, size: int, are_pairs: bool = True) -> Iterator[RawRows]:
+        """
+        Yield blocks of so many rows; lines without any content are left out.
+
+        Rows of pairs have values by the schema; others have text where a cell is no number.
+        """
         for rows in _regrouped(self._blocks(self.names), size):
+            # Numbers and texts as far as they are plain, then values
             full = _has_content(rows.table)
             cells = {name: self._converted(name, rows.table[name]) for name in self.names}
             table = pa.table(cells).filter(pa.array(full))
+            table = with_values(table, self._cell_form) if are_pairs else table
             yield rows._replace(table=table, lines=rows.lines[full])
 
+    @cached_property
+    def _cell_form(self) -> CellForm:
+        """Return how the cells are written; reads the gaps of the whole file."""
+        blocks = self._blocks([GAP]) if GAP in self.names else ()
+        form = cell_form(self.meanings, (rows.table[GAP] for rows in blocks), self._marks)
+        return form._replace(language=form.language or self._language)
+
     def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
-        """Return a column as numbers if every cell is one, else as text for the checks to come."""
+        """Return a column as numbers if every cell is one, else as text."""
         if name not in COLUMNS:
             kind = self._number_types[name]
             return given_texts(cells) if kind is None else _as_numbers(cells, kind)
         if COLUMNS[name].dtype == "str":
             return given_texts(cells)
-        return self._plain_numbers(name, cells)
-
-    def _plain_numbers(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
-        """Return numbers of a known column in the unit of the schema, else text."""
-        mark, unit = self._marks.get(name), self.meanings.units.get(name)
+        # Commas between storeys may make a list
+        mark = self._marks.get(name) if bare_name(name) != "storeys" else None
         points = with_points(cells, mark) if mark else cells
         numbers = _as_numbers(points, pa.float64())
-        if unit is None:
-            return points if numbers is None else numbers
-        return converted_texts(points, unit) if numbers is None else converted(numbers, unit)
+        return points if numbers is None else numbers
 
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
         """Yield these columns as text, some thousands of rows at a time, and the broken lines."""

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
-from per_obspy.inventory.checking import OBSERVED
+from per_obspy.inventory.cells import CellForm
 from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
 from per_obspy.inventory.files.plain_columns import plain_columns
-from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
+from per_obspy.inventory.files.raw_rows import PairFile, RawRows, cell_form, with_values
 from per_obspy.inventory.files.workbook_rows import WorkbookFile
-from per_obspy.inventory.recognition.column_meanings import meanings_of
+from per_obspy.inventory.gap_units import GAP
+from per_obspy.inventory.recognition.column_meanings import IDENTIFIER, meanings_of
 from per_obspy.inventory.recognition.side_file import form_of
-from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 
 #: Prefix that pandas gives to a column of row numbers.
 INDEX = "__index_level_"
@@ -57,8 +57,11 @@ class ParquetFile:
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
-        column = self.headings[self.names.index(IDENTIFIER)]
         with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
+            if IDENTIFIER not in self.names:
+                yield pa.nulls(stored.metadata.num_rows, pa.string())
+                return
+            column = self.headings[self.names.index(IDENTIFIER)]
             for batch in stored.iter_batches(columns=[column]):
                 if pa.types.is_nested(batch.schema.field(0).type):
                     batch.column(0).cast(pa.string())  # lists and the like are no names
@@ -67,36 +70,37 @@ class ParquetFile:
 
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows in the units of the schema."""
-        line = 2
+        line, form = 2, self._cell_form
         with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
             for batch in stored.iter_batches(batch_size=size, columns=self.headings):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
                 # Names and units of the schema
                 table, faults = plain_columns(pa.Table.from_batches([batch]))
-                table = self._in_units(table.select(self.headings).rename_columns(self.names))
+                table = table.select(self.headings).rename_columns(self.names)
                 broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
                 good = np.isin(np.arange(batch.num_rows), list(faults), invert=True)
-                rows = _with_numbers(table).filter(pa.array(good))
+                rows = with_values(table.filter(pa.array(good)), form)
                 yield RawRows(str(self.file), rows, lines[good], tuple(broken))
                 line += batch.num_rows
 
-    def _in_units(self, table: pa.Table) -> pa.Table:
-        """Return a table in the units of the schema; cells that are not numbers are unchanged."""
-        for name, unit in self.meanings.units.items():
-            # Truth values and dates stay, and are rejected as such
-            place, column = table.column_names.index(name), table[name]
-            if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
-                table = table.set_column(place, name, converted(column, unit))
-            elif pa.types.is_string(column.type):
-                table = table.set_column(place, name, converted_texts(column, unit))
-        return table
+    @property
+    def _cell_form(self) -> CellForm:
+        """Return how the cells are written; reads all gaps that are text."""
+        return cell_form(self.meanings, self._gaps(), {})
+
+    def _gaps(self) -> Iterator[pa.ChunkedArray]:
+        """Yield the gaps block by block."""
+        place = self.names.index(GAP)
+        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
+            for batch in stored.iter_batches(columns=[self.headings[place]]):
+                yield plain_columns(pa.Table.from_batches([batch]))[0].column(0)
 
     def _rejection(
         self, table: pa.Table, lines: NDArray[np.int64], row: int, fault: str
     ) -> Rejection:
         """Return the rejection of a row."""
-        name = str(table[IDENTIFIER][row].as_py())
+        name = str(table[IDENTIFIER][row].as_py()) if IDENTIFIER in self.names else ""
         return Rejection("pair", name, str(self.file), int(lines[row]), (fault,))
 
     @contextmanager
@@ -107,18 +111,6 @@ class ParquetFile:
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             problem = unreadable_reason(self.file, "Parquet table", error)
             raise CatalogError(str(self.file), problem) from error
-
-
-def _with_numbers(table: pa.Table) -> pa.Table:
-    """
-    Return the table with 0 and 1 for booleans in the column ``observed``.
-
-    Some programs write it so; in other columns of numbers a boolean is a mistake.
-    """
-    for i, column in enumerate(table.schema):
-        if column.name == OBSERVED and pa.types.is_boolean(column.type):
-            table = table.set_column(i, column.name, table[i].cast(pa.float64()))
-    return table
 
 
 #: Suffixes of layers of footprints, which are not pairs yet.

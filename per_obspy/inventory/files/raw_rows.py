@@ -5,7 +5,7 @@ A file is read twice: once as a whole for its columns and for identifiers of pai
 twice, then block by block.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -15,10 +15,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
+from per_obspy.inventory.cells import NOTES, CellForm, read_columns, unit_in_cells
+from per_obspy.inventory.gap_units import GAP
 from per_obspy.inventory.recognition.column_meanings import Meanings
-
-#: Column with the name of the pair.
-IDENTIFIER = "pair_id"
+from per_obspy.inventory.schema import COLUMNS
 
 
 class RawRows(NamedTuple):
@@ -30,7 +30,8 @@ class RawRows(NamedTuple):
     source : str
         The file.
     table : Table
-        Cells as read; a column of numbers with a cell that is none is still text.
+        Numbers in the units of the schema, null where a cell is empty or not understood, with what
+        is said of such cells in ``cell_notes``; text as it is.
     lines : (n_rows,) ndarray of int
         Line of each row in its file; the header is line 1.
     broken : tuple of Rejection
@@ -79,3 +80,45 @@ def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
         np.asarray(text, dtype=object), categorize=False
     )
     return hashes
+
+
+def with_values(table: pa.Table, form: CellForm) -> pa.Table:
+    """Return a table whose columns of numbers are numbers in the units of the schema."""
+    # Text is left to the checks
+    known = [name for name in table.column_names if name in COLUMNS]
+    chosen = [name for name in known if COLUMNS[name].dtype != "str" or name == NOTES]
+    read = read_columns({name: table[name].to_pandas() for name in chosen}, form)
+    for name, values in read.items():
+        column = pa.chunked_array([pa.array(values, from_pandas=True)])
+        if name in chosen:
+            table = table.set_column(table.column_names.index(name), name, column)
+        else:
+            table = table.append_column(name, column)
+    return table
+
+
+def cell_form(
+    meanings: Meanings, gaps: Iterable[pa.ChunkedArray], marks: Mapping[str, str]
+) -> CellForm:
+    """
+    Return how the cells of a file are written.
+
+    Parameters
+    ----------
+    meanings : Meanings
+        Of its headings.
+    gaps : iterable of ChunkedArray
+        The column of the gaps, block by block; only looked at if its heading has no unit.
+    marks : mapping of str to str
+        Column -> decimal mark.
+    """
+    # Units of headings, those of the schema too, and configured ones
+    units = {means.column: means.unit for means in meanings.columns.values() if means.unit}
+    units |= meanings.units
+    gap_unit = ""
+    for cells in () if GAP in units else gaps:
+        if gap_unit or not pa.types.is_string(cells.type):
+            continue
+        has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
+        gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
+    return CellForm(units, marks, meanings.language, gap_unit)

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection, printable
-from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
+from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs, row_names
 from per_obspy.inventory.files.formats import pair_file
-from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows, name_hashes
+from per_obspy.inventory.files.raw_rows import PairFile, RawRows, name_hashes
 from per_obspy.inventory.gap_units import GAP, GapCounts, gap_counts, gap_suspicions
+from per_obspy.inventory.recognition.column_meanings import IDENTIFIER
 from per_obspy.inventory.recognition.proposals import proposed_units
 from per_obspy.inventory.schema import COLUMNS
 
@@ -97,7 +98,7 @@ def _all_rows(file: PairFile, path: str) -> RawRows:
     # Join the blocks; empty ones may have other types
     tables = [block.table for block in blocks if len(block.table)]
     lines = np.concatenate([block.lines for block in blocks])
-    table = pa.concat_tables(tables or [blocks[0].table])
+    table = pa.concat_tables(tables or [blocks[0].table], promote_options="permissive")
     return RawRows(blocks[0].source, table, lines, broken)
 
 
@@ -124,9 +125,9 @@ def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
 
 def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     """Check a pair table that is in memory already."""
-    check_columns([str(name) for name in table], "table")
     if table.empty:
         raise CatalogError("table", "the table has no rows")
+    check_columns([str(name) for name in table], "table")
     return checked_pairs(table.reset_index(drop=True), "table")
 
 
@@ -182,15 +183,31 @@ class PairInventory:
         """Yield chunks of so many rows; no chunk has rows of two files."""
         seen: set[str] = set()
         self.gaps = GapCounts()
-        for file in self._files.values():
+        stems = [path.stem for path in self._files]
+        for path, file in self._files.items():
+            # Rows without a name of several files are named by both
+            prefix = path.stem if stems.count(path.stem) == 1 else str(path)
             for rows in file.rows(size):
                 self.gaps = self.gaps.joined(gap_counts(rows.table[GAP]))
-                yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], self._repeated, seen))
+                named = _named(rows, f"{prefix} " if len(stems) > 1 else "")
+                yield PairChunk(named, _repeated(named.table[IDENTIFIER], self._repeated, seen))
 
     def recognised(self) -> list[str]:
         """Return a sentence for each file that is not plain: how it is read."""
         sentences = {path: file.recognised for path, file in self._files.items()}
         return [recognised_line(path, text) for path, text in sentences.items() if text]
+
+
+def _named(rows: RawRows, prefix: str) -> RawRows:
+    """Return rows of which each has an identifier, the number of its row if it has no other."""
+    table, is_named = rows.table, IDENTIFIER in rows.table.column_names
+    if is_named and not prefix:
+        return rows  # empty names are left to the checks
+    given = table[IDENTIFIER] if is_named else pa.nulls(len(table), pa.string())
+    names = row_names(pd.DataFrame({IDENTIFIER: given.to_pandas()}), rows.lines, prefix)
+    column = pa.array(names, pa.string())
+    others = table.drop_columns([IDENTIFIER]) if is_named else table
+    return rows._replace(table=others.append_column(IDENTIFIER, column))
 
 
 def recognised_line(path: Path, recognised: str) -> str:

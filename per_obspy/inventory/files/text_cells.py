@@ -52,6 +52,8 @@ def cells(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table whose names and texts are those of :func:`cell`."""
     plain = table.copy(deep=False)
     plain.attrs = {}
+    if plain.columns.empty:
+        return plain
     columns = [
         column if is_numeric_dtype(column) else column.map(cell) for _, column in plain.items()
     ]

@@ -117,7 +117,8 @@ class WorkbookFile:
                 writer.writerow([_on_one_line(cell) for cell in cells])
         # The names are those of the schema now, the numbers as they were
         units = {name: unit.name for name, unit in self.meanings.units.items()}
-        return CsvFile(path, TableForm(encoding="utf-8", separator=",", units=units, **self._mark))
+        form = TableForm(encoding="utf-8", separator=",", units=units, **self._mark)
+        return CsvFile(path, form, self.meanings.language)
 
     @property
     def _mark(self) -> dict[str, str]:

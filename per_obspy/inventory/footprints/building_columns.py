@@ -6,14 +6,12 @@ A column of the layer whose name has another meaning in the schema or the result
 """
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from per_obspy.errors import CatalogError, did_you_mean, printable
-from per_obspy.inventory.checking import is_number
-from per_obspy.inventory.footprints.lengths import read_numbers
+from per_obspy.inventory.cells import is_number
 from per_obspy.inventory.importers.recognition import imported
 from per_obspy.inventory.schema import COLUMNS
 
@@ -24,9 +22,6 @@ GIVEN = (
     *("yield_coefficient", "hardening", "period_log_std", "damping_log_std"),
     "height_log_std",
 )
-
-#: Quantities whose text may have a unit, and counts.
-LENGTHS, COUNTS = ("height", "storey_height"), ("storeys",)
 
 #: Quantities that the outlines give.
 FROM_OUTLINES = ("longitude", "latitude", "area", "geometry")
@@ -44,25 +39,9 @@ PREFIX = "layer_"
 LONGEST_NAME = 190
 
 
-class BuildingColumns(NamedTuple):
-    """
-    Columns of buildings by the schema, and cells that could not be read.
-
-    Attributes
-    ----------
-    table : DataFrame
-        One row per building: columns of the schema without ``_1`` or ``_2``, then all others.
-    faults : dict of str to dict
-        Column -> number of the building -> its unreadable text.
-    """
-
-    table: pd.DataFrame
-    faults: dict[str, dict[int, str]]
-
-
 def building_columns(
     attributes: pd.DataFrame, names: Mapping[str, str], source: str
-) -> BuildingColumns:
+) -> pd.DataFrame:
     """
     Return the attributes of a layer by the schema, with all other columns.
 
@@ -76,6 +55,12 @@ def building_columns(
     source : str
         The file, for messages.
 
+    Returns
+    -------
+    table : DataFrame
+        One row per building: columns of the schema without ``_1`` or ``_2``, then all others;
+        ``cell_notes`` contains what was not understood.
+
     Raises
     ------
     CatalogError
@@ -85,12 +70,7 @@ def building_columns(
     """
     given = _given(attributes, names, source)
     known = imported(attributes, source, given)
-    faults = {}
-    for name in (*LENGTHS, *COUNTS):
-        if name in known:
-            known[name], unread = _read(known[name], name in LENGTHS)
-            faults[name] = unread
-    return BuildingColumns(known.join(_others(attributes, known)), faults)
+    return known.join(_others(attributes, known))
 
 
 def _given(attributes: pd.DataFrame, names: Mapping[str, str], source: str) -> dict[str, pd.Series]:
@@ -108,30 +88,10 @@ def _given(attributes: pd.DataFrame, names: Mapping[str, str], source: str) -> d
                 f"{did_you_mean(column, known)}",
             )
         given[name] = attributes[column]
-    # Texts as texts, with a number where a building has no identifier
-    if "building_id" in given:
-        given["building_id"] = _identifiers(given["building_id"])
+    # An empty cell is no name of a system
     if "system" in given:
         given["system"] = given["system"].fillna("").astype(str)
     return given
-
-
-def _identifiers(cells: pd.Series) -> pd.Series:
-    """Return identifiers as text, the number of the feature where a building has none."""
-    # Whole numbers that were stored as floats lose their decimal point
-    if pd.api.types.is_float_dtype(cells) and (cells.dropna() % 1 == 0).all():
-        cells = cells.astype("Int64")
-    text = cells.astype(str).str.strip()
-    numbers = pd.Series([f"feature {number}" for number in cells.index], index=cells.index)
-    return text.mask(np.asarray(cells.isna()) | (text == ""), numbers)
-
-
-def _read(cells: pd.Series, is_length: bool) -> tuple[pd.Series, dict[int, str]]:
-    """Return cells as numbers, and the text of those that are none by the building's number."""
-    if is_number(cells):
-        return cells, {}
-    numbers, wrong = read_numbers(cells, is_length)
-    return numbers, {int(number): str(cells[number]) for number in cells.index[wrong]}
 
 
 def _others(attributes: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection, shortened
+from per_obspy.inventory.cells import is_unknown, read_numbers
 from per_obspy.inventory.files.csv_rows import CsvFile
-from per_obspy.inventory.footprints.lengths import read_numbers
-from per_obspy.inventory.schema import EMPTY
 
 #: More rows than any list has.
 ALL = 1 << 40
@@ -89,7 +88,7 @@ def read_list(file: Path) -> BuildingList:
     # Headings as they are: their translations are those of pairs
     names = table.own_names
     columns = _columns(file, names)
-    blocks = list(table.rows(ALL))
+    blocks = list(table.rows(ALL, are_pairs=False))
     if not blocks:
         raise CatalogError(str(file), "the table has no rows")
     broken = tuple(line._replace(kind="building") for rows in blocks for line in rows.broken)
@@ -140,7 +139,7 @@ def _columns(file: Path, names: Sequence[str]) -> dict[str, str]:
 
 def _missing(names: Sequence[str], found: Mapping[str, str]) -> str:
     """Return the columns that are missing for outlines."""
-    if "pair_id" in names:
+    if {"pair_id", "gap"} & set(names):
         return "a table of pairs already, not of buildings: per-obspy pairs check checks it"
     missing = [name for name in RECTANGLE if name not in found]
     wanted = f"add a column wkt (outlines in degrees), or {', '.join(missing)}"
@@ -165,19 +164,19 @@ def _polygons(cells: pd.Series, name: str) -> tuple[NDArray[np.object_], dict[in
     for i in np.flatnonzero(shapely.is_missing(outlines)).tolist():
         cell = text.iloc[i].strip()
         quoted = shortened(cell, 40)
-        is_empty = cell.lower() in EMPTY
+        is_empty = is_unknown(cell)
         faults[i] = f"{name} is empty" if is_empty else f"{name} = {quoted!r} is no polygon as WKT"
     return outlines, faults
 
 
 def _side(name: str, column: str, cells: pd.Series) -> tuple[FloatArray, dict[int, str]]:
     """Return a number of rectangles, NaN where it cannot be used, with the reasons."""
-    numbers, wrong = read_numbers(cells, is_length=name in ("width", "length"))
-    values = numbers.to_numpy()
+    read = read_numbers(name, cells)
+    values = read.values
     bad, faults = _out_of_range(name, values), {}
     # Empty cells by name, others as they are
     for i in np.flatnonzero(bad).tolist():
-        is_empty = np.isnan(values[i]) and not wrong.iloc[i]
+        is_empty = np.isnan(values[i]) and i not in read.notes | read.placeholders
         reason = f"= {shortened(str(cells.iloc[i]), 40)!r} is no usable {name}"
         faults[i] = f"{column} {'is empty' if is_empty else reason}"
     return np.where(bad, np.nan, values), faults

@@ -102,7 +102,7 @@ def find_footprint_pairs(
     drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
     # Footprints, without those that repeat another
     source = str(path)
-    buildings, faults, rejected = _usable_buildings(Path(path), layer, columns or {})
+    buildings, rejected = _usable_buildings(Path(path), layer, columns or {})
     shapes = projected(buildings.outlines, source)
     longitude, latitude = shapes.place.T
     table = buildings.table.assign(longitude=longitude, latitude=latitude, area=shapes.area)
@@ -110,7 +110,7 @@ def find_footprint_pairs(
     near = neighbours(shapes.outlines, largest)
     if near.first.size == 0:
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
-    found = NearBuildings(near, table, faults, drawn, shapes.central_meridian)
+    found = NearBuildings(near, table, drawn, shapes.central_meridian)
     pairs = pair_table(found, source)
     pairs.attrs["rejected"] = Rejections(rejected + pairs.attrs["rejected"])
     return FootprintPairs(pairs, Buildings(buildings.outlines, table))
@@ -118,16 +118,16 @@ def find_footprint_pairs(
 
 def _usable_buildings(
     file: Path, layer: str | None, columns: Mapping[str, str]
-) -> tuple[Buildings, dict[str, dict[int, str]], tuple[Rejection, ...]]:
-    """Return the buildings of a layer, their unreadable cells, and the features that are none."""
+) -> tuple[Buildings, tuple[Rejection, ...]]:
+    """Return the buildings of a layer, and the features that are none."""
     # Columns under the names of the schema, and outlines that are no second one
     outlines, attributes, lost = read_layer(file, layer)
-    found = building_columns(attributes, columns, str(file))
-    buildings, repeated = without_repetitions(outlines, found.table, str(file))
+    table = building_columns(attributes, columns, str(file))
+    buildings, repeated = without_repetitions(outlines, table, str(file))
     rejected = (*lost, *repeated)
     if len(buildings.outlines) < 2:
         raise CatalogError(str(file), _too_few(len(buildings.outlines), rejected))
-    return buildings, found.faults, rejected
+    return buildings, rejected
 
 
 def _checked_length(name: str, value: float, column: str) -> float:

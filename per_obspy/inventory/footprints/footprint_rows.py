@@ -8,9 +8,9 @@ import pandas as pd
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import Rejection
-from per_obspy.inventory.checking import Rejections, checked_pairs, plain_numbers
+from per_obspy.inventory.cells import NOTES
+from per_obspy.inventory.checking import Rejections, checked_pairs
 from per_obspy.inventory.contact_height import floor_offset
-from per_obspy.inventory.footprints.lengths import METRES
 from per_obspy.inventory.footprints.neighbours import Neighbours
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
@@ -36,8 +36,6 @@ class NearBuildings(NamedTuple):
         Pairs by the positions of their buildings in the table.
     buildings : DataFrame
         One row per building; the index is the number of the feature.
-    faults : mapping of str to mapping
-        Column -> number of the building -> its text that could not be read.
     drawn : mapping of str to object
         Columns that are the same for every pair: the deviation of a gap and its source.
     central_meridian : float
@@ -46,7 +44,6 @@ class NearBuildings(NamedTuple):
 
     near: Neighbours
     buildings: pd.DataFrame
-    faults: Mapping[str, Mapping[int, str]]
     drawn: Mapping[str, object]
     central_meridian: float
 
@@ -85,7 +82,7 @@ def _checked(
     part: pd.DataFrame, found: NearBuildings, rows: slice, source: str
 ) -> tuple[pd.DataFrame, list[Rejection]]:
     """Return the good pairs of a block, and the rejections of the others."""
-    clear, rejected = _without_faults(part, found, rows, source)
+    clear, rejected = _without_overlaps(part, found, rows, source)
     repeated = clear.pop("_repeated").to_numpy(dtype=bool)
     checked = checked_pairs(clear, source, np.arange(2, len(clear) + 2), repeated)
     # Pairs have no line in the file
@@ -123,7 +120,18 @@ def _rows(found: NearBuildings, names: pd.Series, rows: slice) -> pd.DataFrame:
         chosen = found.buildings.iloc[numbers].reset_index(drop=True)
         names_of = [*_PLACE, *(name for name in chosen if name not in _PLACE)]
         columns |= {f"{name}_{i}": chosen[name] for name in names_of}
-    return _with_heights(pd.DataFrame(columns))
+    table = _with_heights(pd.DataFrame(columns))
+    return _with_notes(table) if f"{NOTES}_1" in table else table
+
+
+def _with_notes(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with the notes on both buildings as notes on the pair."""
+    notes = []
+    for i in (1, 2):
+        texts = table.pop(f"{NOTES}_{i}").fillna("").astype(str)
+        # Columns of a pair have the number of the building
+        notes.append(texts.str.replace(r"(^|; )(\w+) = ", rf"\g<1>\g<2>_{i} = ", regex=True))
+    return table.assign(**{NOTES: (notes[0] + "; " + notes[1]).str.strip("; ")})
 
 
 def _true_azimuth(near: Neighbours, found: NearBuildings) -> FloatArray:
@@ -140,12 +148,9 @@ def _with_heights(table: pd.DataFrame) -> pd.DataFrame:
     unknown = pd.Series(np.nan, index=table.index)
     for i in (1, 2):
         if f"storey_height_{i}" in table:
-            # Text that is no number is left to the checks
-            storeys = plain_numbers(table.get(f"storeys_{i}", unknown))
-            storey_height = plain_numbers(table[f"storey_height_{i}"])
-            height = table.get(f"height_{i}", unknown)
-            table[f"height_{i}"] = height.fillna(storeys * storey_height)
-            table = table.drop(columns=f"storey_height_{i}")
+            # A given height comes first
+            storeys, height = (table.get(f"{name}_{i}", unknown) for name in ("storeys", "height"))
+            table[f"height_{i}"] = height.fillna(storeys * table.pop(f"storey_height_{i}"))
     return table
 
 
@@ -162,21 +167,18 @@ def _with_contact(pairs: pd.DataFrame) -> pd.DataFrame:
     return pairs[[*known, *pairs.columns.difference(known, sort=False)]]
 
 
-def _without_faults(
+def _without_overlaps(
     table: pd.DataFrame, found: NearBuildings, rows: slice, source: str
 ) -> tuple[pd.DataFrame, list[Rejection]]:
-    """Return the pairs without overlaps and unreadable cells, and a rejection for each other."""
-    # Every reason of each pair
-    near = found.near.rows(rows)
-    reasons: dict[int, list[str]] = {}
-    for row, reason in (*_overlaps(near, table), *_unread(near, found)):
-        reasons.setdefault(row, []).append(reason)
+    """Return the pairs without overlaps, and a rejection for each other."""
+    faults = dict(_overlaps(found.near.rows(rows), table))
+    # One reason at most
     rejected = []
-    for row, given in sorted(reasons.items()):
+    for row, reason in faults.items():
         name = str(table["pair_id"].iloc[row])
-        rejected.append(Rejection("pair", name, source, None, tuple(given)))
+        rejected.append(Rejection("pair", name, source, None, (reason,)))
     clear = np.ones(len(table), dtype=bool)
-    clear[list(reasons)] = False
+    clear[list(faults)] = False
     return table[clear].reset_index(drop=True), rejected
 
 
@@ -187,16 +189,3 @@ def _overlaps(near: Neighbours, table: pd.DataFrame) -> Iterator[tuple[int, str]
     for row in np.flatnonzero(share > OVERLAP).tolist():
         area = near.overlap[row]
         yield row, f"footprints overlap by {area:.3g} m2, {share[row]:.0%} of the smaller one"
-
-
-def _unread(near: Neighbours, found: NearBuildings) -> Iterator[tuple[int, str]]:
-    """Yield the pairs of buildings with a cell that could not be read."""
-    units = ", ".join(unit for unit in METRES if unit.isalpha() and len(unit) < 3)
-    for name, texts in found.faults.items():
-        kind = "number" if name == "storeys" else f"length (a number, or with {units})"
-        # Buildings with such a cell, in either place
-        unread = np.isin(found.buildings.index, list(texts))
-        for i, numbers in ((1, near.first), (2, near.second)):
-            for row in np.flatnonzero(unread[numbers]).tolist():
-                text = texts[int(found.buildings.index[numbers[row]])]
-                yield row, f"{name}_{i} = {text!r:.40} is no {kind}"

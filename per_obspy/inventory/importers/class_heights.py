@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-
-from per_obspy.inventory.footprints.lengths import read_numbers
+from numpy.typing import NDArray
 
 #: Known values that a class needs. The median of twenty of log-deviation s is off by 1.25 s / 4.5.
 ENOUGH = 20
@@ -28,16 +27,20 @@ class _Spread(NamedTuple):
     log_std: pd.Series
 
 
-def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
+def with_class_heights(
+    table: pd.DataFrame, classes: pd.Series, is_understood: NDArray[np.bool_] | bool = True
+) -> pd.DataFrame:
     """
     Return a table of buildings with missing heights or storeys estimated by class.
 
     Parameters
     ----------
     table : DataFrame
-        With ``height``, ``storeys`` or ``period``; cells that are no numbers stay as they are.
+        With ``height``, ``storeys`` or ``period``.
     classes : Series
         Class of each building; missing classes form a separate class.
+    is_understood : (n,) ndarray of bool, optional
+        Whether every size of the row was understood; others are not estimated.
 
     Returns
     -------
@@ -46,7 +49,7 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
         least 1e-3, by which the row is marked as derived.
     """
     sizes = [name for name in ("height", "storeys", "period") if name in table]
-    missing = table[sizes].isna().all(axis=1)
+    missing = table[sizes].isna().all(axis=1) & is_understood
     if not missing.any():
         return table
     # Classes as text
@@ -58,18 +61,16 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
             continue
         spread = _spread(table[name], labels)
         rows = missing & spread.median.notna()
-        result[name] = result[name].astype(object).mask(rows, spread.median)
+        result[name] = result[name].mask(rows, spread.median)
         given = result[LOG_STD] if LOG_STD in result else pd.Series(np.nan, table.index)
         result[LOG_STD] = given.mask(rows, spread.log_std.clip(lower=1e-3))
         missing &= ~rows
-    return result.infer_objects()
+    return result
 
 
 def _spread(values: pd.Series, labels: pd.Series) -> _Spread:
     """Return the spread of known positive values by class."""
-    # Cells may have units, as tags of OpenStreetMap do
-    numbers, _ = read_numbers(values, is_length=values.name == "height")
-    logarithms = np.log(numbers.where(numbers > 0.0))
+    logarithms = np.log(values.where(values > 0.0))
     grouped = logarithms.groupby(labels)
     is_enough = grouped.transform("count") >= ENOUGH
     median = np.exp(grouped.transform("median")).where(is_enough)

@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.cells import plain_numbers
 from per_obspy.inventory.importers.asset_json import footprint_of
 from per_obspy.inventory.importers.importer import RawLayer
 from per_obspy.inventory.importers.recognition import recognised

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.errors import CatalogError, did_you_mean
+from per_obspy.inventory.cells import NOTES, read_numbers
 from per_obspy.inventory.importers.class_heights import with_class_heights
 from per_obspy.inventory.importers.importer import Importer
 from per_obspy.inventory.importers.sources.gem import GEM
@@ -35,8 +36,8 @@ IMPORTERS = (
     OWN,
 )
 
-#: Quantities of which a layer must give one.
-_SIZES = ("height", "storeys", "period")
+#: Quantities of which a layer must give one, and the one that makes heights of storeys.
+_SIZES, _STOREY = ("height", "storeys", "period"), "storey_height"
 
 
 def recognised(names: Iterable[str]) -> Importer:
@@ -83,18 +84,63 @@ def imported(
     adapted = importer.adapted(attributes)
     table = _named(adapted, importer, given or {})
     names = set(adapted.columns)
-    # A layer needs one size at least
-    sizes = table[[name for name in _SIZES if name in table]]
-    if sizes.columns.empty or (len(sizes) and sizes.isna().all(axis=None)):
-        raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
+    table, notes, placeholders = _with_sizes(table)
+    _require_sizes(attributes, table, importer, source, notes)
+    # Names of systems and buildings
     if "system" not in table and (systems := _systems(adapted, importer)) is not None:
         table["system"] = systems
     table["building_id"] = _identifiers(table)
     # Missing heights from the classes of the layer
     if importer.class_column is not None:
         unknown = pd.Series("", adapted.index)
-        table = with_class_heights(table, adapted.get(importer.class_column, unknown))
+        classes = adapted.get(importer.class_column, unknown)
+        table = with_class_heights(table, classes, (notes == "").to_numpy())
+    table = _with_notes(table, notes, placeholders)
     return table.join(adapted[[name for name in importer.carried if name in names]])
+
+
+def _with_notes(
+    table: pd.DataFrame, notes: pd.Series, placeholders: Mapping[int, str]
+) -> pd.DataFrame:
+    """Return the table with notes on cells, and on placeholders of buildings without a size."""
+    lost = _sizes(table).isna().all(axis=1).to_numpy() & (notes == "").to_numpy()
+    # By position
+    texts = notes.tolist()
+    for row in placeholders.keys() & set(np.flatnonzero(lost).tolist()):
+        texts[row] = placeholders[row]
+    return table.assign(**{NOTES: texts}) if any(texts) else table
+
+
+def _sizes(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the columns of sizes that a table has."""
+    return table[[name for name in _SIZES if name in table]]
+
+
+def _require_sizes(
+    attributes: pd.DataFrame, table: pd.DataFrame, importer: Importer, source: str, notes: pd.Series
+) -> None:
+    """Raise CatalogError if a layer has no size of any building, not even one to be quoted."""
+    sizes = _sizes(table)
+    is_empty = len(sizes) and sizes.isna().all(axis=None) and (notes == "").all()
+    if sizes.columns.empty or is_empty:
+        raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
+
+
+def _with_sizes(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.Series, dict[int, str]]:
+    """Return sizes as numbers, notes on the cells of each row, and placeholders by row."""
+    # By row: what was not understood, and numbers that mean nothing
+    notes: list[list[str]] = [[] for _ in range(len(table))]
+    placeholders = dict[int, str]()
+    for name in (*_SIZES, _STOREY):
+        if name in table:
+            numbers = read_numbers(name, table[name])
+            table[name] = numbers.values
+            for row, note in numbers.notes.items():
+                notes[row].append(note)
+            for row, number in numbers.placeholders.items():
+                placeholders[row] = f"{name} = {number:g} is a placeholder, not a size"
+    texts = pd.Series(["; ".join(said) for said in notes], table.index, dtype=object)
+    return table, texts, placeholders
 
 
 def _named(

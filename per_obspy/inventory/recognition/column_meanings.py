@@ -1,5 +1,6 @@
 """Find the columns of the schema in a table, by configured names or by its headings."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -8,12 +9,16 @@ from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.inventory.recognition.headings import (
     Heading,
     is_building_list,
-    plain_heading,
+    is_complete,
     proposals,
     recognised,
 )
 from per_obspy.inventory.recognition.units import Unit, unit_of, unit_problem
+from per_obspy.inventory.recognition.words import plain_word
 from per_obspy.inventory.schema import COLUMNS
+
+#: Column with the name of the pair.
+IDENTIFIER = "pair_id"
 
 
 class Meanings(NamedTuple):
@@ -48,6 +53,13 @@ class Meanings(NamedTuple):
         named = {means.column: self.cells[place] for place, means in self.columns.items()}
         return {name: heading for name, heading in named.items() if name != heading}
 
+    @property
+    def language(self) -> str:
+        """Language of most headings, empty if they are English or of none."""
+        languages = Counter(heading.language for heading in self.columns.values())
+        del languages[""], languages["en"]
+        return languages.most_common(1)[0][0] if languages else ""
+
     def has_language(self, language: str) -> bool:
         """Return whether a heading is in a language."""
         return any(means.language == language for means in self.columns.values())
@@ -55,11 +67,14 @@ class Meanings(NamedTuple):
     def sentence(self) -> str:
         """Return the columns that are renamed or in other units as one text, empty if none is."""
         texts = []
+        # In the order of the schema
         for name in COLUMNS:
             heading, unit = self.renamed.get(name), self.units.get(name)
             if heading or unit:
                 named = f"{name} = {heading!r}" if heading else name
                 texts.append(f"{named} in {unit.name}" if unit else named)
+        if IDENTIFIER not in self.names and is_complete(set(self.names)):
+            texts.append(f"no {IDENTIFIER}: each pair is named by its row, as 'row 2'")
         return ", ".join(texts)
 
     def as_form(self, form: TableForm) -> TableForm:
@@ -136,14 +151,14 @@ def _given_places(
 ) -> dict[int, str]:
     """Return place in the header -> column, for the names of the user that are there."""
     places = dict[int, str]()
-    plain = [plain_heading(cell) for cell in cells]
+    plain = [plain_word(cell) for cell in cells]
     for name, heading in given.columns.items():
         if name not in COLUMNS:
             problem = f"[pairs.columns] {name}: a pair table has no such column"
             raise CatalogError(source, f"{problem}{did_you_mean(name, COLUMNS)}")
         # As it is written, else without regard to case and accents
         same = [place for place, cell in enumerate(cells) if cell == heading.strip()]
-        same = same or [place for place, cell in enumerate(plain) if cell == plain_heading(heading)]
+        same = same or [place for place, cell in enumerate(plain) if cell == plain_word(heading)]
         if len(same) == 1 and same[0] not in places:
             places[same[0]] = name
         elif must_have:

@@ -1,42 +1,24 @@
 """
 Headings of a table taken for columns of the schema: other cases, languages, units and numbering.
 
-``headings.csv`` holds the words of each language and the sources of the terms. A heading may have
+``words.csv`` holds the words of each language and the sources of the terms. A heading may have
 the number of the building anywhere (``altura 1``, ``edificio 2 altura``, ``height_A``) and a unit
 behind its words (``gap (cm)``, ``height_1_ft``).
 """
 
-import csv
 import re
 from collections import defaultdict
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
-from unicodedata import combining, normalize
+from unicodedata import normalize
 
 from per_obspy.inventory.recognition.units import Unit, is_unit, unit_of
+from per_obspy.inventory.recognition.words import plain_word, word_rows, words
 from per_obspy.inventory.schema import COLUMNS, ONE_OF
 
 #: Most headings, and longest one, in which words are sought.
 MOST_HEADINGS, LONGEST_HEADING = 1000, 200
-
-#: Words of headings without a meaning for their column.
-_FILLERS = frozenset(
-    (
-        *("id", "no", "nr", "num", "number", "numero", "nombre", "n", "of", "the", "between"),
-        *("de", "di", "do", "da", "del", "della", "des", "du", "d", "la", "le", "el", "lo"),
-        *("entre", "tra", "arasi"),
-    )
-)
-
-#: Words for a building, which headings of its columns may have.
-_BUILDINGS = frozenset(
-    (
-        *("building", "bldg", "structure", "edificio", "edif", "estructura", "bina", "yapi"),
-        *("fabbricato", "batiment", "bat", "predio", "建物", "棟"),
-    )
-)
 
 _INDICES = {"1": 1, "2": 2}
 _LETTERS = {"a": 1, "b": 2}
@@ -67,7 +49,7 @@ class Heading(NamedTuple):
 
 class _Word(NamedTuple):
     """
-    A word of ``headings.csv``.
+    A heading of ``words.csv``.
 
     Attributes
     ----------
@@ -86,16 +68,16 @@ class _Word(NamedTuple):
 
 @cache
 def _words() -> dict[str, _Word]:
-    """Return the words by their plain form; those of two columns are left out."""
-    file = Path(__file__).with_suffix(".csv")
-    lines = file.read_text(encoding="utf-8").splitlines()
+    """Return the headings by their plain form; those of two columns are left out."""
+    columns_of_pairs = {re.sub(r"_[12]$", "", name) for name in COLUMNS}
     found: dict[str, list[dict[str, str]]] = defaultdict(list)
-    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        found[_joined(_tokens(row["heading"]))].append(row)
+    for row in word_rows():
+        if row["meaning"] in columns_of_pairs:
+            found[_joined(_tokens(row["word"]))].append(row)
     # Words of one column, which may be words of several languages
     words = {}
     for text, same in found.items():
-        columns = {row["column"] for row in same}
+        columns = {row["meaning"] for row in same}
         if len(columns) == 1:
             # No particular language if several have the word
             languages = {row["language"] for row in same}
@@ -112,25 +94,10 @@ def _bare_names() -> dict[str, str]:
     return {_joined(_tokens(bare)): bare for bare in names.values()}
 
 
-def plain_heading(text: str) -> str:
-    """
-    Return a heading in lower case, without accents and surrounding blanks.
-
-    Examples
-    --------
-    >>> plain_heading(" SEPARACIÓN "), plain_heading("kat sayısı")
-    ('separacion', 'kat sayisi')
-    """
-    decomposed = normalize("NFKD", normalize("NFKC", text).casefold())
-    return (
-        "".join(letter for letter in decomposed if not combining(letter)).replace("ı", "i").strip()
-    )
-
-
 def _tokens(text: str) -> list[str]:
     """Return the words and numbers of a heading, without those that have no meaning."""
-    found = re.findall(r"[^\W\d_]+|\d+", plain_heading(text))
-    return [token for token in found if token not in _FILLERS] or found[:1]
+    found = re.findall(r"[^\W\d_]+|\d+", plain_word(text))
+    return [token for token in found if token not in words("filler")] or found[:1]
 
 
 def _joined(tokens: Sequence[str]) -> str:
@@ -167,7 +134,7 @@ def _split_unit(heading: str) -> tuple[str, str]:
         text = inside[1].strip()
         rest = heading.replace(heading[inside.start() : inside.end()], " ")
         # Brackets may hold the number of the building, or its letter
-        is_index = plain_heading(text) in (*_INDICES, *_LETTERS)
+        is_index = plain_word(text) in (*_INDICES, *_LETTERS)
         return (f"{rest} {text}", "") if is_index else (rest, text)
     # height_ft_1, height_1_ft, gap cm
     parts = re.split(r"[\s_,]+", heading.strip())
@@ -186,9 +153,9 @@ def _column_of(tokens: list[str]) -> Heading | None:
     if len(indices) > 1:
         return None
     # With and without the word for a building
-    without = [token for token in rest if token not in _BUILDINGS]
-    for words in (rest, without):
-        text = _joined(words)
+    without = [token for token in rest if token not in words("building")]
+    for tokens in (rest, without):
+        text = _joined(tokens)
         # Names of the schema come before the words of a language
         bare = _bare_names().get(text)
         word = _Word(bare, "", True) if bare else _words().get(text)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.cells import plain_numbers
 from per_obspy.inventory.schema import COLUMNS
 
 

@@ -6,7 +6,6 @@ one every form that can be is tried, and the one whose headings mean most column
 """
 
 import csv
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -53,6 +52,8 @@ class TextForm(NamedTuple):
         Of its cells.
     lines : int
         Number of lines of the file.
+    header_end : int
+        Last line of the header, whose cells may have line breaks.
     is_doubtful : bool
         Whether another encoding would give other letters, and no heading decides.
     """
@@ -63,6 +64,7 @@ class TextForm(NamedTuple):
     cells: tuple[str, ...]
     meanings: Meanings
     lines: int = 0
+    header_end: int = 0
     is_doubtful: bool = False
 
     def sentence(self) -> str:
@@ -105,7 +107,7 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     meanings = meanings_of(best.cells, given, str(file))
     lines = encodings[best.encoding] or check_text(file, best.encoding)
     is_western = best.encoding == "cp1252" and TURKISH_PAGE in encodings
-    is_doubtful = is_western and not _language(meanings)
+    is_doubtful = is_western and not meanings.language
     return best._replace(meanings=meanings, lines=lines, is_doubtful=is_doubtful)
 
 
@@ -116,15 +118,8 @@ def _is_plain(form: TextForm) -> bool:
 
 def _rank(form: TextForm) -> tuple[int, bool]:
     """Return the criteria between forms: columns, and Turkish words in the Turkish code page."""
-    is_turkish = form.encoding == TURKISH_PAGE and _language(form.meanings) == "tr"
+    is_turkish = form.encoding == TURKISH_PAGE and form.meanings.language == "tr"
     return len(form.meanings.columns), is_turkish
-
-
-def _language(meanings: Meanings) -> str:
-    """Return the language of most headings, empty if they are English or of none."""
-    languages = Counter(heading.language for heading in meanings.columns.values())
-    del languages[""], languages["en"]
-    return languages.most_common(1)[0][0] if languages else ""
 
 
 def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> Iterator[TextForm]:
@@ -133,9 +128,9 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
     for encoding in encodings:
         head = _first_lines(file, encoding)
         for separator in separators:
-            for number, cells in _headers(head, separator):
+            for number, end, cells in _headers(head, separator):
                 found = meanings_of(cells, given, str(file), must_have=False)
-                form = TextForm(encoding, separator, number, tuple(cells), found)
+                form = TextForm(encoding, separator, number, tuple(cells), found, header_end=end)
                 # Any bytes may be Japanese: only a heading decides
                 if encoding != JAPANESE or given.encoding or found.has_language("ja"):
                     yield form
@@ -155,12 +150,26 @@ def _first_lines(file: Path, encoding: str) -> list[str]:
     return text.split("\n")[:HEADER_LINES]
 
 
-def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the lines that may be a header, with their cells."""
+def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, list[str]]]:
+    """Yield first and last line of what may be a header, with its cells."""
     for number, line in enumerate(lines, 1):
-        try:
-            cells = next(csv.reader([line], delimiter=separator, strict=True), [])
-        except csv.Error:
-            cells = [line] if number == 1 else []
+        # A cell with line breaks ends on a later line
+        end, text = number, line
+        while (cells := _strict_cells(text, separator)) is None and end < len(lines):
+            text, end = f"{text}\n{lines[end]}", end + 1
+            if '"' not in line:
+                break
+        if cells is None:
+            end, cells = number, [line] if number == 1 else []
         if cells and (number == 1 or len(cells) >= _FEWEST):
-            yield number, [cell.strip() for cell in cells]
+            yield number, end, [" ".join(cell.split()) for cell in cells]
+
+
+def _strict_cells(text: str, separator: str) -> list[str] | None:
+    """Return the cells of a row, None if its quotation marks are wrong."""
+    try:
+        return next(
+            csv.reader(text.splitlines(keepends=True), delimiter=separator, strict=True), []
+        )
+    except csv.Error:
+        return None

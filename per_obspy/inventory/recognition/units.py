@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from per_obspy.errors import did_you_mean
+from per_obspy.inventory.recognition.words import named, plain_word
 from per_obspy.inventory.schema import COLUMNS
 
 #: Standard acceleration of gravity, m/s² (3rd CGPM, 1901): a weight in kN is the mass it belongs
@@ -46,30 +47,11 @@ _UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "1": {"1": (1, 1), "%": (1, 100)},
 }  # fmt: skip
 
-#: Other ways to write a unit, in lower case; words of several languages.
-_SPELLINGS = {
-    "m": ("metre", "metres", "meter", "meters", "metro", "metros", "metri", "mètre", "mètres",
-          "mt", "mts", "メートル"),
-    "mm": ("millimetre", "millimetres", "millimeter", "millimeters", "milimetre", "milímetros",
-           "millimetri", "millimètres", "ミリ"),
-    "cm": ("centimetre", "centimetres", "centimeter", "centimeters", "santimetre", "centímetros",
-           "centimetri", "centimètres", "センチ"),
-    "ft": ("foot", "feet", "'"),
-    "in": ("inch", "inches", '"'),
-    "m2": ("m²", "sqm", "sq m", "metrekare", "mq", "㎡"),
-    "ft2": ("ft²", "sqft", "sq ft"),
-    "t": ("tonne", "tonnes", "tonelada", "toneladas", "tonnellate"),
-    "kN": ("kn",),
-    "MN": ("mn",),
-    "lb": ("lbs",),
-    "kip": ("kips",),
-    "s": ("sec", "seconds", "seg", "sn", "秒"),
-    "deg": ("degree", "degrees", "°", "º", "grados", "gradi", "graus", "degrés", "derece", "度"),
-    "rad": ("radians",),
-    "%": ("percent", "per cent", "pct"),
-}  # fmt: skip
 
-_BY_SPELLING = {spelling: name for name, words in _SPELLINGS.items() for spelling in words}
+def unit_of_schema(name: str) -> str:
+    """Return the unit of a column of pairs or buildings; sides and storeys' heights are in m."""
+    column = COLUMNS.get(name) or COLUMNS.get(f"{name}_1")
+    return column.unit if column else "m"
 
 
 def unit_of(text: str, column: str) -> Unit | None:
@@ -79,19 +61,19 @@ def unit_of(text: str, column: str) -> Unit | None:
     Parameters
     ----------
     text : str
-        As it is written, in any case.
+        As it is written, in any case and language of ``words.csv``.
     column : str
-        Name of the schema.
+        Name of the schema, with or without the number of the building.
 
     Examples
     --------
     >>> unit_of("CM", "gap"), unit_of("cm", "mass_1"), unit_of("m", "system_1")
     (Unit(name='cm', numerator=1, denominator=100), None, None)
     """
-    known = _UNITS.get(COLUMNS[column].unit, {})
-    word = text.strip().lower()
-    name = next((name for name in known if name.lower() == word), _BY_SPELLING.get(word, ""))
-    return Unit(name, *known[name]) if name in known else None
+    units = _UNITS.get(unit_of_schema(column), {})
+    word = plain_word(text)
+    name = next((name for name in units if name.lower() == word), named("unit").get(word, ""))
+    return Unit(name, *units[name]) if name in units else None
 
 
 def unit_problem(text: str, column: str) -> str:
@@ -113,6 +95,5 @@ def is_unit(text: str) -> bool:
     >>> is_unit("mm"), is_unit("storeys")
     (True, False)
     """
-    word = text.strip().lower()
     names = {name.lower() for known in _UNITS.values() for name in known} - {"1"}
-    return word in _BY_SPELLING or word in names
+    return plain_word(text) in names | set(named("unit"))

@@ -39,13 +39,17 @@ def read(tmp_path):
         ('a,1,5" wall\nb,1,"\n', {2: 'a,1,5" wall'}, [(3, OPEN)]),
         # Closed on a later line
         ('a,1,"x\ny"\nb,1,z\n', {2: 'a,1,"x y"', 4: "b,1,z"}, []),
-        ('"p\nq",1,x\nb,1,z\n', {4: "b,1,z"}, [(2, "pair_id has a line break")]),
+        ('"p\nq",1,x\nb,1,z\n', {2: '"p q",1,x', 4: "b,1,z"}, []),
+        ('a,"5\ncm",x\nb,bitişik,z\n', {2: 'a,"5 cm",x', 4: "b,bitişik,z"}, []),
+        ('a,"1\r\n","x\n\ny"\nb,1,z\n', {2: 'a,"1 ","x  y"', 6: "b,1,z"}, []),
         # Never closed, or closed by the mark of a later row
         ('a,1,"x\nb,1,z\n', {3: "b,1,z"}, [(2, OPEN)]),
         ('a,1,"x\nb,1,z"\n', {3: 'b,1,z"'}, [(2, OPEN)]),
         ('"a,1,x\n"b",1,z\n', {3: '"b",1,z'}, [(2, OPEN)]),
         ('a,1,"x\nb,1,"z"\n', {3: 'b,1,"z"'}, [(2, OPEN)]),
         ('a,1,"x\nb,1,""\n', {3: 'b,1,""'}, [(2, OPEN)]),
+        ('a,1,"x\nb,bitişik,"y"\n', {3: 'b,bitişik,"y"'}, [(2, OPEN)]),
+        ('a,1,"x\nb,3-5,"y"\n', {3: 'b,3-5,"y"'}, [(2, OPEN)]),
         # Text that no reader should join to a number
         ('a,"0.1"5,x\n', {}, [(2, AFTER)]),
         ('a,"0.1" ,x\n', {}, [(2, AFTER)]),

@@ -6,8 +6,9 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from per_obspy import read_pairs
+from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.files.reading import PairInventory
+from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note"
 GOOD = "007,0.05,-67.95,-20.35,12,-67.9501,-20.35,9.5,corner shop"
@@ -100,22 +101,46 @@ def test_a_comma_inside_quotes_is_no_separator(write):
     assert pairs.loc[0, "note"] == "shop, corner"
 
 
+def test_cells_with_line_breaks_are_read_and_every_line_is_counted(tmp_path):
+    # as spreadsheets write headings of two lines; a bad row after them has its own line
+    path = tmp_path / "pares.csv"
+    path.write_text(
+        '"Nombre\ndel par","Separación\n(cm)",Longitud 1,Latitud 1,Altura 1,'
+        "Longitud 2,Latitud 2,Altura 2,Notas\n"
+        '"a\nb",5,1,1,9,1,1,9,"two\nlines"\n'
+        'c,"3\n-5 cm",1,1,9,1,1,9,x\n'
+        "d,5,east,1,9,1,1,9,x\n"
+    )
+    pairs = read_pairs(path, TableForm(columns={"pair_id": "Nombre del par"}))
+    assert pairs["pair_id"].tolist() == ["a b", "c"]
+    assert pairs["gap"].tolist() == pytest.approx([0.05, 0.04])
+    assert pairs["Notas"].tolist() == ["two lines", "x"]
+    assert [(row.row, row.name) for row in pairs.attrs["rejected"]] == [(9, "d")]
+
+
 def test_text_in_a_column_of_numbers_is_named_with_its_row(write):
     bad = GOOD.replace("0.05", "five").replace("007", "008")
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD}\n{bad}\n"))
+    assert pairs["cell_notes"].tolist() == ["", "gap = 'five' is not a number"]
+    # A place is needed, a gap is not
+    place = pairs["longitude_1"][0]
+    bad = GOOD.replace(f",{place:g},", ",east,").replace("007", "008")
     (rejection,) = read_pairs(write(f"{HEADER}\n{GOOD}\n{bad}\n")).attrs["rejected"]
     assert rejection[:4] == ("pair", "008", str(rejection.source), 3)
-    assert rejection.reasons == ("gap = 'five' is not a number",)
+    assert rejection.reasons == ("longitude_1 = 'east' is not a number",)
 
 
 def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
     table = pd.DataFrame(
-        {"pair_id": ["a"], "gap": ["1,5"], "longitude_1": [1.0], "latitude_1": [1.0]}
+        {"pair_id": ["a"], "gap": ["wide"], "longitude_1": [1.0], "latitude_1": [1.0]}
     )
     table = table.assign(longitude_2=1.0, latitude_2=1.0, height_1=3.0, height_2=3.0)
     table.to_parquet(tmp_path / "pairs.parquet")
+    assert read_pairs(tmp_path / "pairs.parquet")["gap"].isna().tolist() == [True]
+    table.assign(latitude_1="north").to_parquet(tmp_path / "pairs.parquet")
     pairs = read_pairs(tmp_path / "pairs.parquet")
     assert pairs.empty
-    assert pairs.attrs["rejected"][0].reasons == ("gap = '1,5' is not a number",)
+    assert pairs.attrs["rejected"][0].reasons == ("latitude_1 = 'north' is not a number",)
 
 
 ROW = f"{HEADER}\n{GOOD}\n"
@@ -168,3 +193,31 @@ def test_missing_file_and_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(CatalogError, match="no such file"):
         read_pairs(tmp_path / "folder.csv")
+
+
+def test_a_table_without_names_is_named_by_its_rows_and_says_so(tmp_path):
+    rows = (
+        "Boşluk (cm),Boylam 1,Enlem 1,Kat 1,Boylam 2,Enlem 2,Kat 2,Bina 1 Adı,Taşıyıcı sistem 1\n"
+    )
+    rows = rows.replace("Boşluk", "Derz") + (
+        "bitişik,29,41,Z+4,29,41,5,Ev,Betonarme\n3-5,29,41,3+1,29,41,5,Okul,Yığma\n"
+        "?,29,41,B+Z+3,29,41,5,Cami,taş\n"
+    )
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(rows)
+    pairs = read_pairs(tmp_path / "a.csv")
+    assert "no pair_id: each pair is named by its row, as 'row 2'" in pairs.attrs["recognised"]
+    assert pairs["pair_id"].tolist() == ["row 2", "row 4"]
+    assert pairs["building_id_1"].tolist() == ["Ev", "Cami"]
+    assert pairs["system_1"].tolist() == ["concrete_mrf", "other"]
+    assert pairs["storeys_1"].tolist() == [5.0, 5 - 1]
+    assert pairs["gap"].tolist()[0] == 0.0
+    assert pairs["gap"].isna().tolist()[1]
+    (lost,) = pairs.attrs["rejected"]
+    assert (lost.name, lost.row) == ("row 3", 3)
+    assert "storeys_1 = '3+1' is not a number" in lost.reasons[0]
+    # Several files of one inventory
+    chunks = PairInventory([tmp_path / "a.csv", tmp_path / "b.csv"]).chunks(2)
+    tables = [checked_chunk(chunk) for chunk in chunks]
+    names = [name for table in tables for name in table["pair_id"]]
+    assert names == ["a row 2", "a row 4", "b row 2", "b row 4"]

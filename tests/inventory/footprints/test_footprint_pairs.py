@@ -269,9 +269,14 @@ def test_heights_that_are_none(write):
     pairs = pairs_from_footprints(write(houses, height=["9", "nine", "-3", "6"]))
     assert pairs.empty
     reasons = [rejection.reasons for rejection in pairs.attrs["rejected"]]
+    none = "none of height_{0}, storeys_{0}, period_{0} is a number, one is needed"
     assert reasons == [
-        ("height_2 = 'nine' is no length (a number, or with m, ft, in, cm, mm)",),
-        ("height_1 = 'nine' is no length (a number, or with m, ft, in, cm, mm)",),
+        (f"{none.format(2)}: height_2 = 'nine' is not a number",),
+        # every reason of the pair
+        (
+            "height_2 = -3 m is outside 2 to 1000 m",
+            f"{none.format(1)}: height_1 = 'nine' is not a number",
+        ),
         ("height_1 = -3 m is outside 2 to 1000 m",),
     ]
 

@@ -52,11 +52,13 @@ def test_storeys_are_estimated_where_a_class_has_no_heights():
     assert filled.loc[0, "height_log_std"] == pytest.approx(np.log(2.0) / 2.0, rel=0.02)
 
 
-def test_storeys_or_text_that_is_no_number_are_not_replaced():
-    table = pd.DataFrame({"height": [None, "~9", *(["9"] * 30)], "storeys": ["3", *([None] * 31)]})
-    filled = with_class_heights(table, pd.Series([""] * 32))
-    assert filled["height"].tolist()[1] == "~9"
-    assert filled["height"].isna().tolist()[0]
+def test_storeys_or_cells_that_are_not_understood_are_not_replaced():
+    table = pd.DataFrame(
+        {"height": [np.nan, np.nan, *([9.0] * 30)], "storeys": [3.0] + [np.nan] * 31}
+    )
+    is_understood = np.arange(32) != 1
+    filled = with_class_heights(table, pd.Series([""] * 32), is_understood)
+    assert filled["height"].isna().tolist()[:3] == [True, True, False]
 
 
 def test_layers_of_surveys_are_left_as_they_are():

@@ -94,7 +94,7 @@ def test_too_many_rows_are_refused(tmp_path, monkeypatch):
 def test_points_of_berkeley(real_data):
     raw = read_csv_points(real_data / "inventories" / "BerkeleyBuildings_full.csv", "a")
     table = imported(raw.attributes, "Berkeley")
-    assert table["storeys"].tolist()[:2] == ["2", "1"]
+    assert table["storeys"].tolist()[:2] == [2.0, 1.0]
     assert table["system"].tolist()[0] == "other"  # W1, wood
     assert {geometry.geom_type for geometry in raw.geometries} == {"Point"}
     assert raw.geometries[0].x == pytest.approx(-122.2842009)

@@ -36,7 +36,7 @@ def test_a_made_extract(tmp_path):
     raw = read_osm_file(osm_xml(tmp_path, town), "town")
     table = imported(raw.attributes, "town")
     assert table["building_id"].tolist() == ["w1000", "w1001", "w1002", "w1003"]
-    assert table["storeys"].tolist() == ["4", "3", "2", "3"]
+    assert table["storeys"].tolist() == [4.0, 3.0, 2.0, 3.0]
     # seven decimals of a degree
     assert shapely.bounds(raw.geometries) == pytest.approx(shapely.bounds(town.outlines), abs=6e-8)
 
@@ -70,9 +70,18 @@ def test_heights_with_units(tmp_path, text, expected):
     assert pairs_from_footprints(path)["height_1"].tolist()[0] == pytest.approx(expected)
 
 
-def test_a_height_that_is_none_is_a_rejected_pair(tmp_path):
+def test_a_height_that_is_none_leaves_the_storeys_to_decide(tmp_path):
     path = osm_xml(tmp_path, small_town())
-    path.write_text(path.read_text().replace('v="12.0"', 'v="9;12"'))
+    text = path.read_text().replace('v="12.0"', 'v="9;12"')
+    path.write_text(text)
+    pairs = pairs_from_footprints(path)
+    assert len(pairs) == 2
+    assert pairs["height_1"].isna()[0]
+    assert pairs["storeys_1"][0] == 4.0
+    assert pairs["cell_notes"].tolist() == ["height_1 = '9;12' is not a number", ""]
+    # Without storeys the building has no size
+    path.write_text(text.replace('k="building:levels" v="4"', 'k="building:levels" v="1,2"'))
     pairs = pairs_from_footprints(path)
     assert len(pairs) == 1
-    assert "'9;12'" in pairs.attrs["rejected"][0].reasons[0]
+    (reason,) = pairs.attrs["rejected"][0].reasons
+    assert "height_1 = '9;12' is not a number; storeys_1 = '1,2' is not a number" in reason

@@ -45,7 +45,7 @@ def test_openstreetmap():
         "a",
     )
     assert table["building_id"].tolist() == ["12", "13"]
-    assert table["storeys"].tolist()[0] == "3"  # checked as a number later
+    assert table["storeys"].tolist()[0] == 3.0
 
 
 def test_our_own_names_with_a_system():

@@ -1,19 +1,20 @@
 """
 Decimal marks of whole columns: decisive, ambiguous and unchanged cells.
 
-Also of per_obspy.inventory.recognition.unit_columns and per_obspy.inventory.recognition.units.
+Also of per_obspy.inventory.recognition.units.
 """
 
 import math
 
+import pandas as pd
 import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from per_obspy.inventory.cells import CellForm, read_numbers
 from per_obspy.inventory.recognition.decimal_marks import evidence_of, marks_of, with_points
-from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.recognition.units import unit_of, unit_problem
 
 
@@ -94,12 +95,14 @@ DEFINED = [
 
 @pytest.mark.parametrize(("column", "name", "value", "expected"), DEFINED)
 def test_units_by_their_definition(column, name, value, expected):
-    unit = unit_of(name, column)
-    (number,) = converted(pa.chunked_array([[value]]), unit).to_pylist()
-    (text, word) = converted_texts(pa.chunked_array([[str(value), "x"]]), unit).to_pylist()
+    form = CellForm({column: unit_of(name, column)})
+    # Of its column, as a number and as text, and of the cell itself
+    (number,) = read_numbers(column, pd.Series([value]), form).values
+    text, empty = read_numbers(column, pd.Series([str(value), "x"]), form).values
+    (own,) = read_numbers(column, pd.Series([f"{value} {name}"])).values
     # A product and a quotient of doubles
-    assert_allclose(number, expected, rtol=1e-15)
-    assert (float(text), word) == (number, "x")
+    assert_allclose([number, text, own], expected, rtol=1e-15)
+    assert math.isnan(empty)
 
 
 def test_units_of_another_dimension_are_none():

@@ -4,16 +4,13 @@ Headings of several languages and forms, and meanings that they never have.
 Also of per_obspy.inventory.recognition.column_meanings.
 """
 
-import csv
-from pathlib import Path
-
 import pytest
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.recognition import headings
 from per_obspy.inventory.recognition.column_meanings import meanings_of
 from per_obspy.inventory.recognition.headings import meaning, recognised
+from per_obspy.inventory.recognition.words import word_rows
 from per_obspy.inventory.schema import COLUMNS
 
 #: heading -> column and unit
@@ -75,15 +72,14 @@ def test_words_that_may_mean_something_else_are_not_taken(heading):
 
 def test_every_word_of_the_table_means_its_column():
     # would catch a word that a filler or the word for a building takes away
-    file = Path(headings.__file__).with_suffix(".csv")
-    lines = [line for line in file.read_text("utf-8").splitlines() if line[0] != "#"]
-    rows = list(csv.DictReader(lines))
+    bare = {name.removesuffix("_1").removesuffix("_2") for name in COLUMNS}
+    rows = [row for row in word_rows() if row["meaning"] in bare]
     assert {row["language"] for row in rows} == {"en", "es", "tr", "it", "fr", "pt", "ja"}
     for row in rows:
-        is_pairs = row["column"] in COLUMNS
-        found = meaning(row["heading"] if is_pairs else f"{row['heading']} 1")
+        is_pairs = row["meaning"] in COLUMNS
+        found = meaning(row["word"] if is_pairs else f"{row['word']} 1")
         assert found is not None, row
-        assert found.column == (row["column"] if is_pairs else f"{row['column']}_1"), row
+        assert found.column == (row["meaning"] if is_pairs else f"{row['meaning']}_1"), row
 
 
 def test_a_whole_table_by_its_own_names_is_left_as_it_is():

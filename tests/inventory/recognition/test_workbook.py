@@ -133,15 +133,21 @@ def test_cells_are_what_the_program_stored(write):
         ["computed", "=1/8|0.125", *ROWS[0][2:]],
     ]
     pairs = read_pairs(write(rows))
-    assert pairs["pair_id"].tolist() == ["7", "computed"]
-    assert pairs["gap"].tolist() == [0.1, 0.125]
-    assert pairs["note"].tolist() == ["two lines", "corner"]
-    rejected = [(row.row, row.name, *row.reasons) for row in pairs.attrs["rejected"]]
-    assert rejected == [
-        (2, "date", "gap = '2026-10-05 00:00:00' is not a number"),
-        (3, "truth", "gap = 'True' is not a number"),
-        (4, "error", "gap = '#REF!' is not a number"),
+    assert pairs["pair_id"].tolist() == ["date", "truth", "error", "7", "computed"]
+    assert pairs["gap"].tolist()[3:] == [0.1, 0.125]
+    assert pairs["note"].tolist()[3:] == ["two lines", "corner"]
+    assert pairs["cell_notes"].tolist() == [
+        "gap = '2026-10-05 00:00:00' is not a number",
+        "gap = 'True' is not a number",
+        "gap = '#REF!' is not a number",
+        "",
+        "",
     ]
+    # A place that is none rejects its row, with the number that it has in the sheet
+    rows[1][2] = "#REF!"
+    pairs = read_pairs(write(rows))
+    rejected = [(row.row, row.name, *row.reasons) for row in pairs.attrs["rejected"]]
+    assert rejected == [(2, "date", f"{NAMES[2]} = '#REF!' is not a number")]
     assert {row.source.partition(", ")[2] for row in pairs.attrs["rejected"]} == {"sheet 'Pairs'"}
 
 

@@ -9,7 +9,7 @@ Source: U.S. Army Corps of Engineers, National Structure Inventory, technical do
 
 import pandas as pd
 
-from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.cells import plain_numbers
 from per_obspy.inventory.importers.importer import Importer
 
 #: People at night, by age.

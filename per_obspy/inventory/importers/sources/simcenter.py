@@ -11,7 +11,7 @@ Earthquake Model Technical Manual, table 5-1.
 
 import pandas as pd
 
-from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.cells import read_numbers
 from per_obspy.inventory.importers.importer import Importer
 
 #: Units of length in m.
@@ -38,9 +38,11 @@ def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
     name = next((name for name in ("Height", "height") if name in attributes), None)
     if name is None:
         return attributes
+    # Each building in the unit of its file
     unknown = pd.Series("", attributes.index)
     units = attributes.get(LENGTH_UNIT, unknown).astype(str).str.strip().str.lower()
-    return attributes.assign(height_m=plain_numbers(attributes[name]) * units.map(METRES))
+    heights = read_numbers("height", attributes[name]).values
+    return attributes.assign(height_m=heights * units.map(METRES))
 
 
 SIMCENTER = Importer(

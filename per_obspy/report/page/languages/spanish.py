@@ -288,6 +288,10 @@ SPANISH: dict[str, str] = {
         "la tabla no da separación: la demanda es la separación necesaria; probabilidad, estado e "
         "impactos están vacíos o son los de la separación que supone la configuración"
     ),
+    "flag_doubtful_cell": (
+        "una celda de la tabla de pares no se entendió y queda vacía, o la separación es un rango, "
+        "una estimación o un límite: vea cell_notes"
+    ),
     "flag_touching": "separación 0: el golpe único está fuera de su rango confiable",
     "flag_single_hit_unreliable": (
         "separación menor que 0.6 de la demanda: probablemente varios impactos, el golpe único "
@@ -366,6 +370,7 @@ SPANISH: dict[str, str] = {
     "flag_record_warning": ("el registro falló otra revisión que solo advierte: vea stations.csv"),
     "flag_simulated": "el movimiento del suelo es simulado",
     "flagname_unknown_gap": "separación desconocida",
+    "flagname_doubtful_cell": "celda dudosa",
     "flagname_touching": "en contacto",
     "flagname_single_hit_unreliable": "golpe único poco confiable",
     "flagname_outside_usable_periods": "fuera de períodos utilizables",

@@ -1,0 +1,592 @@
+"""
+Cells of tables of pairs and buildings as values: the one way from a text to a number or a word.
+
+A cell may have a unit of its own (``5 cm``), a word of several languages (``bitişik``, ``unknown``,
+``Betonarme``), a code of floors (``Z+4``), a placeholder (``-9999``); a gap may also be a range
+(``3-5``), an estimate (``~4``) or a limit (``< 2``). What cannot be understood is empty, and its
+text goes to the column ``cell_notes``.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.errors import shortened
+from per_obspy.inventory.recognition.units import Unit, unit_of, unit_of_schema
+from per_obspy.inventory.recognition.words import named, plain_word, words
+from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
+
+#: Column of the texts that were not understood, or are no exact value.
+NOTES = "cell_notes"
+
+#: Longest text that is read as a value, characters.
+LONGEST = 40
+
+#: Numbers that programs write where they have none: they mean nothing outside a column's range. A
+#: negative gap is an overlap or a mistake, and 0 is a gap.
+PLACEHOLDERS = (0.0, -1.0, -9.0, -99.0, -999.0, -9999.0, -99999.0, 999.0, 9999.0, 99999.0)
+_OF_GAPS = PLACEHOLDERS[3:]
+
+#: Placeholders that are one within the range of heights too.
+_HIGH = (999.0, 9999.0)
+
+#: A number that no column has: fill values of grids are 1e20, 9.97e36, 3.4e38.
+_FILL = 1e19
+
+#: A gap that is estimated by eye is between half of it and one and a half (reasoned).
+ABOUT = 0.5
+
+#: Where other gaps have a unit, a number without one is in doubt from here on, m (reasoned: gaps
+#: in m are hardly wider, and those in cm are hardly a smaller number).
+DOUBTFUL = 0.3
+
+#: Standard deviation over width of an even distribution, as gaps in a range have it (reasoned).
+EVEN = 1.0 / np.sqrt(12.0)
+
+#: The only column of numbers that may hold truth values: whether pounding was seen.
+OBSERVED = "observed"
+
+#: A number with a decimal point or comma.
+_DIGITS = r"(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)"
+_NUMBER = re.compile(rf"([+-]?{_DIGITS}(?:[eE][+-]?\d+)?)\s*([^\d\s+,.-].*?|)\.?", re.ASCII)
+_INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
+_FEET_AND_INCHES = re.compile(rf"(\d+)\s*(?:ft|['′’])\s*({_DIGITS})\s*(?:in|''|[\"″”])?", re.ASCII)
+_STOREYS = re.compile(r"[+-]?\d+(?:\.\d*|,0+|,5)?(?:e[+-]?\d+)?", re.ASCII)
+_PLUS_MINUS = re.compile(r"(.*?)\s*(?:±|\+/-|\+-)\s*(.*)")
+
+#: Letters of full width, as Japanese keyboards write them, and a minus of typographers.
+_FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000: 32, 0x2212: 45}
+
+
+class CellForm(NamedTuple):
+    """
+    How the cells of a table are written.
+
+    Attributes
+    ----------
+    units : mapping of str to Unit
+        Column -> unit of its numbers without one, where that is not the schema's.
+    marks : mapping of str to str
+        Column -> its decimal mark, where the column has commas.
+    language : str
+        Of the headings, empty if they are English or of none.
+    gap_unit : str
+        A unit other than m that cells of the gaps have, where their heading has none: a number
+        without a unit is then in doubt.
+    """
+
+    units: Mapping[str, Unit] = {}
+    marks: Mapping[str, str] = {}
+    language: str = ""
+    gap_unit: str = ""
+
+
+#: A table whose numbers are in the units of the schema.
+PLAIN_CELLS = CellForm()
+
+
+class Value(NamedTuple):
+    """
+    Meaning of one text.
+
+    Attributes
+    ----------
+    number : float
+        In the unit of the schema, NaN if it is unknown.
+    deviation : float
+        Standard deviation of a gap that is no exact one, 0 else.
+    note : str
+        What is wrong or special about the text, empty if nothing is.
+    is_placeholder : bool
+        Whether it is a number that means nothing.
+    """
+
+    number: float
+    deviation: float = 0.0
+    note: str = ""
+    is_placeholder: bool = False
+
+
+class Numbers(NamedTuple):
+    """
+    A column of numbers.
+
+    Attributes
+    ----------
+    values, deviations : (n,) ndarray
+        In the unit of the schema; NaN where a cell is empty, unknown or not understood; deviations
+        are 0 where a value is exact.
+    notes : dict of int to str
+        Position of a row -> what is wrong or special about its cell.
+    placeholders : dict of int to float
+        Position of a row -> number in the unit of the schema that means nothing.
+    """
+
+    values: FloatArray
+    deviations: FloatArray
+    notes: dict[int, str]
+    placeholders: dict[int, float]
+
+
+def is_number(values: pd.Series) -> bool:
+    """Return whether a column's type is that of real numbers: truth values and dates are none."""
+    kind = values.dtype
+    is_other = pd.api.types.is_bool_dtype(kind) or pd.api.types.is_complex_dtype(kind)
+    return pd.api.types.is_numeric_dtype(kind) and not is_other
+
+
+def plain_numbers(values: pd.Series) -> pd.Series:
+    """Return cells as numbers, NaN where they are none; truth values and dates are none."""
+    if is_number(values):
+        return values
+    # As text, as pandas takes dates for nanoseconds and truth values for 0 and 1
+    return pd.to_numeric(values.astype(str).mask(values.isna()), errors="coerce")
+
+
+def bare_name(name: str) -> str:
+    """Return a column's name without the number of the building."""
+    return re.sub(r"_[12]$", "", name)
+
+
+def is_unknown(text: str) -> bool:
+    """
+    Return whether a text is a word for an empty or unknown cell.
+
+    Examples
+    --------
+    >>> is_unknown("Bilinmiyor"), is_unknown("n/a"), is_unknown("0")
+    (True, True, False)
+    """
+    return text.strip().lower() in EMPTY or plain_word(text) in words("unknown")
+
+
+def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> Numbers:
+    """
+    Return a column as numbers in the unit of the schema.
+
+    Parameters
+    ----------
+    name : str
+        Of the schema, with or without the number of the building.
+    cells : Series
+        Numbers or text; dates are no numbers, truth values are only in ``observed``.
+    form : CellForm, optional
+        Of the table.
+
+    Examples
+    --------
+    >>> read_numbers("height_1", pd.Series(["6 m", "20 ft", "-9999", "?"])).values.round(3)
+    array([6.   , 6.096,   nan,   nan])
+    """
+    is_truth = pd.api.types.is_bool_dtype(cells.dtype) and name == OBSERVED
+    if is_number(cells) or is_truth:
+        return _plain(name, cells.to_numpy(dtype=np.float64, na_value=np.nan), form)
+    # Each text once: a table has few different ones
+    codes, texts = pd.factorize(cells.astype(str).mask(cells.isna(), ""))
+    if name == "gap" and not form.gap_unit and name not in form.units:
+        form = form._replace(gap_unit=unit_in_cells(texts))
+    read = [read_number(name, text, form) for text in texts]
+    # Back to the rows
+    numbers = np.array([one.number for one in read], dtype=float)
+    deviations = np.array([one.deviation for one in read], dtype=float)
+    is_none = np.array([one.is_placeholder for one in read], dtype=bool)
+    notes = _by_row(codes, [one.note for one in read])
+    return _without(numbers[codes], is_none[codes])._replace(
+        deviations=deviations[codes], notes=notes
+    )
+
+
+def _without(values: FloatArray, is_none: NDArray[np.bool_]) -> Numbers:
+    """Return exact numbers without those that mean nothing."""
+    # These are kept, as a message may need them
+    lost = {row: float(values[row]) for row in np.flatnonzero(is_none).tolist()}
+    return Numbers(np.where(is_none, np.nan, values), np.zeros(values.size), {}, lost)
+
+
+def _plain(name: str, raw: FloatArray, form: CellForm) -> Numbers:
+    """Return numbers of a column in the unit of the schema."""
+    unit = form.units.get(name)
+    values = raw if unit is None else raw * unit.numerator / unit.denominator
+    return _without(values, placeholders(name, raw, values))
+
+
+def _by_row(codes: NDArray[np.int64], notes: Sequence[str]) -> dict[int, str]:
+    """Return the notes by row, from those of the different texts."""
+    has_note = np.array([note != "" for note in notes], dtype=bool)
+    return {row: notes[codes[row]] for row in np.flatnonzero(has_note[codes]).tolist()}
+
+
+def placeholders(name: str, raw: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
+    """
+    Return where numbers mean nothing: placeholders of programs.
+
+    Parameters
+    ----------
+    name : str
+        Column; positions have none, as each row needs them.
+    raw, values : (n,) ndarray
+        As they are written, and in the unit of the schema.
+    """
+    # Positions have none, and gaps fewer
+    bare = bare_name(name)
+    column = COLUMNS.get(name) or COLUMNS.get(f"{name}_1")
+    if column is not None and column.required and bare != "gap":
+        return np.zeros(raw.shape, dtype=bool)
+    low, high = (column.low, column.high) if column else (1e-9, np.inf)
+    is_one = np.isin(raw, _OF_GAPS if bare == "gap" else PLACEHOLDERS) | (np.abs(raw) > _FILL)
+    is_none = is_one & np.isfinite(raw) & ((values < low) | (values > high))
+    if bare in ("height", "storeys", "storey_height"):
+        is_none |= np.isin(raw, _HIGH)
+    return np.asarray(is_none)
+
+
+def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
+    """
+    Return the meaning of one text in a column of numbers.
+
+    Examples
+    --------
+    >>> read_number("gap", "5 cm").number, read_number("gap", "bitişik").number
+    (0.05, 0.0)
+    >>> read_number("storeys_1", "Z+4").number, read_number("damping_1", "5 %").number
+    (5.0, 0.05)
+    """
+    plain = text.translate(_FULL_WIDTH).strip()
+    if is_unknown(plain):
+        return Value(np.nan)
+    if len(plain) > LONGEST:
+        return _wrong(name, text)
+    number = _exact(name, plain, form)
+    if number is None:
+        inexact = _inexact(name, text.strip(), plain, form) if bare_name(name) == "gap" else None
+        return inexact or _wrong(name, text)
+    # A gap whose unit is in doubt
+    if _lacks_unit(name, plain, number, form):
+        note = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
+        return Value(np.nan, note=note)
+    # As it is written, without its unit
+    digits = _NUMBER.fullmatch(plain)
+    raw = _decimal(digits[1], form.marks.get(name, "")) if digits else None
+    is_none = placeholders(name, np.array([raw or number]), np.array([number]))
+    return Value(number, is_placeholder=bool(is_none[0]))
+
+
+def _wrong(name: str, text: str) -> Value:
+    """Return the meaning of a text that is not understood."""
+    note = f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number"
+    return Value(np.nan, note=note)
+
+
+def _exact(name: str, text: str, form: CellForm) -> float | None:
+    """Return the number that a text is in its column, None if it is none."""
+    if bare_name(name) == "storeys":
+        return _storeys(text, form.language, form.marks.get(name, ""))
+    answer = plain_word(text)
+    if name == OBSERVED and answer in {**words("yes"), **words("no")}:
+        return float(answer in words("yes"))
+    return _quantity(name, text, form)
+
+
+def _lacks_unit(name: str, text: str, number: float, form: CellForm) -> bool:
+    """Return whether a gap has no unit where others have one, and its size does not tell it."""
+    has_unit = bool(re.search(r"[^\d\s.,eE+-]", text))
+    return bool(form.gap_unit) and name == "gap" and number >= DOUBTFUL and not has_unit
+
+
+def unit_in_cells(texts: Iterable[object]) -> str:
+    """Return a unit other than m that texts of gaps have, empty if none has one."""
+    for text in texts:
+        for _, unit in _measures("gap", str(text).translate(_FULL_WIDTH)[: LONGEST + 1]):
+            if unit.name != "m":
+                return unit.name
+    return ""
+
+
+def _measures(name: str, text: str) -> Iterator[tuple[str, Unit]]:
+    """Yield the numbers of a text that have a unit."""
+    for found in re.finditer(rf"({_DIGITS})\s*([^\W\d_]+|['′’\"″”]+)", text, re.ASCII):
+        if unit := unit_of(found[2], name):
+            yield found[1], unit
+
+
+def _decimal(text: str, mark: str = "") -> float | None:
+    """
+    Return a number with a decimal point or comma; None if it may be one with thousands.
+
+    Without a decimal mark of the column, three digits after a comma may be thousands, but after a
+    0; in a column of decimal commas those after a point may be.
+    """
+    sign = {"": ",", ",": r"\."}.get(mark)
+    if sign and re.fullmatch(rf"[+-]?(?!0+,)\d+{sign}\d{{3}}(?:[eE].*)?", text, re.ASCII):
+        return None
+    try:
+        return float(text.replace(",", "" if mark == "." else "."))
+    except ValueError:
+        return None
+
+
+def _quantity(name: str, text: str, form: CellForm) -> float | None:
+    """Return a number with its unit or that of its column, in the unit of the schema."""
+    if _INFINITE.fullmatch(text):
+        return float(text)
+    mark = form.marks.get(name, "")
+    # Feet and inches together
+    if unit_of_schema(name) == "m" and (both := _FEET_AND_INCHES.fullmatch(text)):
+        inches = _decimal(both[2], mark)
+        return None if inches is None else float(both[1]) * 0.3048 + inches * 0.0254
+    found = _NUMBER.fullmatch(text)
+    number = _decimal(found[1], mark) if found else None
+    if found is None or number is None:
+        return None
+    unit = unit_of(found[2], name) if found[2] else form.units.get(name)
+    if unit is None:
+        return None if found[2] else number
+    return number * unit.numerator / unit.denominator
+
+
+def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
+    """Return a gap that is a word, a range, an estimate or a limit; None if it is none."""
+    # Raised digits and fractions are no digits of a number
+    if any(letter.isnumeric() and not letter.isascii() for letter in plain):
+        return None
+    word = plain_word(plain.replace("’", "'").replace("(", " ").replace(")", " "))
+    if word in words("touching"):
+        return Value(0.0)
+    if (limited := _limited(name, text, word, form)) is not None:
+        return limited
+    return _ranged(name, text, word, form)
+
+
+def _ranged(name: str, text: str, word: str, form: CellForm) -> Value | None:
+    """Return a gap between two numbers or with a deviation, None if it is none."""
+    if found := _PLUS_MINUS.fullmatch(word):
+        ends = _both(name, found[1], found[2], form)
+        return ends and _noted(name, text, ends[0], ends[1], "")
+    # Words between blanks, signs anywhere
+    for separator in words("to"):
+        sign = re.escape(separator)
+        sign = rf"\s+{sign}\s+" if separator.isalpha() and separator.isascii() else rf"\s*{sign}\s*"
+        if found := re.fullmatch(rf"(.*?\d.*?){sign}(.*\d.*)", word):
+            ends = _both(name, found[1], found[2], form)
+            if ends is not None and min(ends) >= 0.0:
+                return _even(name, text, *sorted(ends))
+    return None
+
+
+def _limited(name: str, text: str, word: str, form: CellForm) -> Value | None:
+    """Return a gap that is an estimate or a limit, None if it is none."""
+    for kind in ("about", "below", "above"):
+        for inner in _inner(word, kind):
+            number = _bound(name, inner, form)
+            if number is None or number < 0.0:
+                continue
+            # The ends of what it may be
+            if kind == "above":
+                return _noted(name, text, number, 0.0, "the least it may be")
+            low = number * (1.0 - ABOUT) if kind == "about" else 0.0
+            return _even(name, text, low, number * (1.0 + ABOUT) if kind == "about" else number)
+    return None
+
+
+def _inner(word: str, kind: str) -> Iterator[str]:
+    """Yield a text without each word of a kind that is at its beginning or end."""
+    for sign in words(kind):
+        # No part of a longer word
+        is_word = sign[-1].isalpha() and sign.isascii()
+        start = rf"{re.escape(sign)}{r'(?![a-z])' if is_word else ''}[\s.]*(.+)"
+        end = (
+            rf"(.+?){r'(?<![a-z])' if sign[0].isalpha() and is_word else ''}\s*{re.escape(sign)}\.?"
+        )
+        for pattern in (start, end):
+            if found := re.fullmatch(pattern, word):
+                yield found[1].strip("() ")
+
+
+def _bound(name: str, text: str, form: CellForm) -> float | None:
+    """Return a number of an inexact gap; None where it lacks the unit that other cells have."""
+    number = _quantity(name, text, form)
+    return None if number is None or _lacks_unit(name, text, number, form) else number
+
+
+def _both(name: str, first: str, second: str, form: CellForm) -> tuple[float, float] | None:
+    """Return two numbers, of which the first may have the unit of the second."""
+    # The unit may be behind both
+    unit = next((unit for _, unit in _measures(name, second)), None)
+    inner = form if unit is None else form._replace(units={**form.units, name: unit}, gap_unit="")
+    ends = _bound(name, first, inner), _bound(name, second, form)
+    return None if ends[0] is None or ends[1] is None else (ends[0], ends[1])
+
+
+def _even(name: str, text: str, low: float, high: float) -> Value:
+    """Return a gap that may as well be anywhere between two."""
+    return _noted(name, text, (low + high) / 2.0, (high - low) * EVEN, "")
+
+
+def _noted(name: str, text: str, number: float, deviation: float, why: str) -> Value:
+    """Return an inexact gap with its note; unknown if its deviation is beyond any gap's."""
+    quoted = f"{name} = {shortened(text, LONGEST)!r}"
+    if deviation > COLUMNS["gap_std"].high:
+        return Value(np.nan, note=f"{quoted} is too wide a range for a gap in m")
+    why = why or f"with a deviation of {deviation:.3g} m"
+    return Value(number, deviation, f"{quoted} is read as {number:.3g} m, {why}")
+
+
+def _storeys(text: str, language: str, mark: str) -> float | None:
+    """
+    Return a number of storeys above ground; None for lists (``3;4``, ``1,2``) and unusual codes.
+
+    A comma is decimal only before a 0, or before a 5 in a column of decimal commas.
+    """
+    word = plain_word(text)
+    parts = [_without_storey(part.strip()) for part in word.split("+")]
+    if found := _STOREYS.fullmatch(parts[0] if len(parts) == 1 else word):
+        return float(found[0].replace(",", ".")) if mark == "," or ",5" not in word else None
+    return _floors(parts, language)
+
+
+def _floors(parts: Sequence[str], language: str) -> float | None:
+    """Return the floors of a code: basements, one ground floor, and those above it."""
+    codes = [re.sub(r"^\d+\s*|\s*\d+$", "", part) for part in parts]
+    ground = [code for code in codes if code in words("ground")]
+    # A code of two kinds needs the language
+    sure = [code for code in ground if code not in words("basement")]
+    sure = sure or [code for code in ground if language in words("ground")[code]]
+    others = {code for code in codes[:-1] if code not in sure}
+    if len(sure) != 1 or not others <= set(words("basement")) or sure[0] not in parts:
+        return None
+    return float(parts[-1]) + 1.0 if re.fullmatch(r"\d{1,3}", parts[-1], re.ASCII) else None
+
+
+def _without_storey(part: str) -> str:
+    """Return a number without words for storeys around it, any other text as it is."""
+    bare = part
+    for sign in words("storey"):
+        bare = bare.removeprefix(sign).removesuffix(sign).strip()
+    return bare if bare[:1].isdigit() and bare[-1:].isdigit() else part
+
+
+def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
+    """
+    Return stripped text, "" in empty cells, and the notes of those that are none of the choices.
+
+    Parameters
+    ----------
+    name : str
+        Column of text of the schema.
+    cells : Series
+        Anything; structural systems and answers may be words of several languages.
+    """
+    # Blanks and words for an empty cell
+    column = COLUMNS[name]
+    texts = cells.astype(str).str.strip().mask(cells.isna(), "").reset_index(drop=True)
+    empty = EMPTY if name in ("pair_id", NOTES) else EMPTY | words("unknown").keys()
+    texts = texts.mask(texts.str.lower().isin(empty), "")
+    if not column.choices:
+        return texts, {}
+    # Each text once
+    codes, distinct = pd.factorize(texts)
+    chosen = [_chosen(column, text) for text in distinct]
+    allowed = ", ".join(column.choices)
+    notes = [
+        f"{name} = {shortened(text, LONGEST)!r} is unknown, expected {allowed}"
+        if word is None
+        else ""
+        for word, text in zip(chosen, distinct, strict=True)
+    ]
+    meanings = {text: word or "" for text, word in zip(distinct, chosen, strict=True)}
+    return texts.map(meanings), _by_row(codes, notes)
+
+
+def _chosen(column: Column, text: str) -> str | None:
+    """Return the choice that a text means, "" if it is unknown, None if it means none of them."""
+    word = plain_word(text)
+    if not word or word in words("unknown"):
+        return ""
+    # Answers, and structural systems
+    meant = word if word in column.choices else named("system").get(word, "")
+    if set(column.choices) == {"yes", "no"}:
+        meant = next((answer for answer in column.choices if word in words(answer)), "")
+    return meant if meant in column.choices else None
+
+
+def read_columns(
+    columns: Mapping[str, pd.Series], form: CellForm = PLAIN_CELLS
+) -> dict[str, pd.Series]:
+    """
+    Return columns of the schema as values, with the column ``cell_notes`` if there is a note.
+
+    Parameters
+    ----------
+    columns : mapping of str to Series
+        Of one table, by the names of the schema.
+    form : CellForm, optional
+        Of the table.
+
+    Returns
+    -------
+    columns : dict
+        Numbers as float64, NaN where they are empty or not understood. A gap that is no exact
+        value adds its deviation to ``gap_std``. A placeholder is empty if the building has another
+        size, and stays what it is otherwise.
+    """
+    read, notes = dict[str, pd.Series](), list[dict[int, str]]()
+    numbers = dict[str, Numbers]()
+    # Column by column
+    for name, cells in columns.items():
+        if COLUMNS[name].dtype == "str":
+            read[name], wrong = read_texts(name, cells)
+            notes.append(wrong)
+        else:
+            numbers[name] = read_numbers(name, cells, form)
+            read[name] = pd.Series(numbers[name].values)
+            notes.append(numbers[name].notes)
+    # Values that rest on several columns
+    for group in ONE_OF:
+        notes.append(_without_size(read, numbers, group))
+    if "gap" in numbers and (deviations := numbers["gap"].deviations).any():
+        read["gap_std"] = _joined(read.get("gap_std"), deviations)
+    return _with_notes(read, notes)
+
+
+def _joined(given: pd.Series | None, deviations: FloatArray) -> pd.Series:
+    """Return deviations of gaps, m, with those of inexact cells as independent errors."""
+    exact = pd.Series(np.nan, range(deviations.size)) if given is None else given
+    return exact.where(deviations == 0.0, np.hypot(exact.fillna(0.0), deviations))
+
+
+def _with_notes(
+    read: dict[str, pd.Series], notes: Sequence[Mapping[int, str]]
+) -> dict[str, pd.Series]:
+    """Add the notes of all columns to the column of notes, which tables without one need not."""
+    if not any(notes):
+        return read
+    # Behind those that the table has already
+    before = read.get(NOTES, pd.Series("", next(iter(read.values())).index))
+    texts = before.astype(object).tolist()
+    for column in notes:
+        for row, note in column.items():
+            texts[row] = f"{texts[row]}; {note}" if texts[row] else note
+    return read | {NOTES: pd.Series(texts, dtype=object)}
+
+
+def _without_size(
+    read: dict[str, pd.Series], found: Mapping[str, Numbers], group: tuple[str, ...]
+) -> dict[int, str]:
+    """Put back the placeholders of buildings that have no other size; return notes of high ones."""
+    sizes = [read[name].isna() for name in group if name in read]
+    notes = dict[int, str]()
+    for name in group:
+        for row, number in found[name].placeholders.items() if name in found else ():
+            if not all(size[row] for size in sizes):
+                continue
+            # Out of the column's range the number itself is the reason
+            if COLUMNS[name].low <= number <= COLUMNS[name].high:
+                notes[row] = f"{name} = {number:g} is a placeholder, not a size"
+            else:
+                read[name][row] = number
+    return notes
