@@ -116,17 +116,27 @@ _UNIT_WORDS = {
     "ft": "feet", "t": "tonnes or kN", "km/s": "km/s", "in": "inches",
 }  # fmt: skip
 
+#: Columns of what another row may describe otherwise.
+_SEEN_IN = {
+    "height": ("height",),
+    "number of storeys": ("storeys",),
+    "period": ("period",),
+    "system": ("system",),
+    "place": ("longitude", "latitude"),
+}
+
 _INT_MAX = np.iinfo(np.int64).max
 
 
 class _Odd(NamedTuple):
-    """Rows that are odd for one reason: flag, subject, reason, rows, and columns to quote."""
+    """Rows that are odd for one reason: flag, subject, reason, rows, quoted cells or example."""
 
     flag: str
     subject: str
     reason: str
     rows: NDArray[np.bool_]
     columns: tuple[str, ...]
+    example: str = ""
 
 
 class _Numbers:
@@ -147,6 +157,35 @@ class _Numbers:
             self._columns[name] = known
         return self._columns[name]
 
+    def height(self, i: int) -> FloatArray:
+        """Return heights of building i, m, from storeys where they are not given."""
+        height = self[f"height_{i}"]
+        if not self.has(f"storeys_{i}"):
+            return height
+        return np.where(np.isnan(height), STOREY * self[f"storeys_{i}"], height)
+
+    def period_ratio(self, i: int) -> FloatArray:
+        """Return periods of building i over those of frames of its height, if both are possible."""
+        name = f"ratio_{i}"
+        if name in self._columns or not self.has(f"period_{i}"):
+            return self._columns.get(name, self._missing)
+        height, period = self.height(i), self[f"period_{i}"]
+        possible = (height > 0.0) & (height <= TOWER) & (period > 0.0)
+        possible &= period <= COLUMNS[f"period_{i}"].high
+        # Few rows of most tables give periods
+        ratio = self._missing.copy()
+        ratio[possible] = period[possible] / (FRAME_PERIOD * height[possible] ** FRAME_EXPONENT)
+        self._columns[name] = ratio
+        return ratio
+
+    def storey_mass(self, i: int) -> FloatArray:
+        """Return masses of building i per storey, kg, NaN where they are not above 0."""
+        storeys = np.fmax(np.where(self.height(i) > 0.0, self.height(i) / STOREY, 1.0), 1.0)
+        counted = np.fmax(np.where(self[f"storeys_{i}"] > 0.0, self[f"storeys_{i}"], storeys), 1.0)
+        # Nothing else tells how many storeys there are: one
+        mass = self[f"mass_{i}"]
+        return np.where(mass > 0.0, mass, np.nan) / counted
+
 
 def numbers_of(cells: pa.ChunkedArray) -> FloatArray:
     """
@@ -161,10 +200,49 @@ def numbers_of(cells: pa.ChunkedArray) -> FloatArray:
         number = r"^\s*[+-]?(\d{1,300}(\.\d{0,300})?|\.\d{1,300})([eE][+-]?\d{1,3})?\s*$"
         is_number = pc.match_substring_regex(cells, number)
         cells = pc.utf8_trim_whitespace(pc.if_else(is_number, cells, None))
+    # Truth values and dates are no numbers
     elif not (pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)):
         return np.full(len(cells), np.nan)
     numbers: FloatArray = pc.cast(cells, pa.float64(), safe=False).to_numpy()
     return numbers
+
+
+class _Places:
+    """Positions of the pairs of some rows: distance, m, and direction, degrees from north."""
+
+    def __init__(self, numbers: _Numbers) -> None:
+        self.longitude = (numbers["longitude_1"], numbers["longitude_2"])
+        self.latitude = (numbers["latitude_1"], numbers["latitude_2"])
+        with np.errstate(invalid="ignore", over="ignore"):
+            in_range = [np.abs(degrees) <= 180.0 for degrees in self.longitude]
+            in_range += [np.abs(degrees) <= 90.0 for degrees in self.latitude]
+            # On a sphere taken as flat, across the date line too
+            north = self.latitude[1] - self.latitude[0]
+            east = _turned(self.longitude[1] - self.longitude[0])
+            east *= np.cos(np.deg2rad(self.latitude[0]))
+            distance = METRES_PER_DEGREE * np.hypot(north, east)
+        # Pairs that are too far apart are rejected
+        in_range.append(distance <= LARGEST_SEPARATION)
+        self.is_valid: NDArray[np.bool_] = np.logical_and.reduce(in_range)
+        self.distance = np.where(self.is_valid, distance, np.nan)
+        self.direction = np.rad2deg(np.arctan2(east, north))
+
+    def beyond(self, numbers: _Numbers, per_root: float) -> FloatArray:
+        """Return the distance beyond the gap and so many times the roots of the areas, m."""
+        with np.errstate(invalid="ignore"):
+            roots = np.sqrt(numbers["area_1"]) + np.sqrt(numbers["area_2"])
+        return self.distance - np.nan_to_num(np.clip(numbers["gap"], 0.0, 10.0)) - per_root * roots
+
+    def angle_to(self, azimuth: FloatArray) -> FloatArray:
+        """Return the angle between azimuths and the lines between positions, 0 to 180 degrees."""
+        with np.errstate(invalid="ignore"):
+            angle = np.abs(_turned(azimuth - self.direction))
+            return np.where(self.distance >= LINE, angle, np.nan)
+
+
+def _turned(angle: FloatArray) -> FloatArray:
+    """Return an angle in degrees as -180 to 180."""
+    return angle - 360.0 * np.rint(angle / 360.0)
 
 
 class Suspicions:
@@ -214,35 +292,45 @@ class Suspicions:
         account = self._files.setdefault(source, _FileAccount())
         numbers = _Numbers(table)
         place = _Places(numbers)
-        odd = [*_odd_gaps(numbers, place), *_odd_places(numbers, place), *_odd_sizes(numbers)]
-        odd += [*_odd_oscillators(numbers)]
-        # Pairs and buildings of earlier rows
-        comparable = place.is_valid & ~repeated
-        again, contradicting = self._earlier.compare(table, numbers, comparable, lines)
-        odd += [
-            _Odd(
-                "repeated_pair", "", "the same two buildings as in an earlier row", again.rows, ()
-            ),
-            *(
-                _Odd(
-                    "contradicting_building",
-                    "",
-                    f"building_id_{i} has another {name} than in an earlier row",
-                    rows,
-                    (f"building_id_{i}", *columns),
-                )
-                for i, name, rows, columns in contradicting
-            ),
-        ]
+        odd = [*_odd_gaps(numbers, place), *_odd_places(numbers, place)]
+        for i in (1, 2):
+            odd += [*_odd_sizes(numbers, i), *_odd_oscillators(numbers, i)]
+            odd += _odd_masses(numbers, i)
+        odd += [*_odd_contacts(numbers), *self._repeated(table, numbers, place, lines, repeated)]
+        # Count the odd rows, then whole columns
         found = [one for one in odd if one.rows.any()]
-        account.add_rows(found, table, lines, again.earlier_line)
+        account.add_rows(found, table, lines)
         account.add_columns(numbers, place, lines)
         if not found:
             return np.full(len(table), "", dtype=object)
+        # Flags of a row in the order of their meanings
         flags = {name: np.zeros(len(table), dtype=bool) for name in ROW_SUSPICIONS}
         for one in found:
             flags[one.flag] |= one.rows
         return joined_names(flags)
+
+    def _repeated(
+        self,
+        table: pa.Table,
+        numbers: _Numbers,
+        place: _Places,
+        lines: NDArray[np.int64],
+        repeated: NDArray[np.bool_],
+    ) -> Iterator[_Odd]:
+        """Yield rows with a pair or a building that an earlier row has."""
+        comparable = place.is_valid & ~repeated
+        again, earlier, contradicting = self._earlier.compare(table, numbers, comparable, lines)
+        reason = "the same two buildings as in an earlier row"
+        # Its line in the file of the earlier row
+        first = int(earlier[np.argmax(again)]) if again.any() else 0
+        yield _Odd("repeated_pair", "", reason, again, (), f"as line {first}")
+        # Each difference of either building
+        for name, buildings in contradicting.items():
+            rows: NDArray[np.bool_] = np.logical_or(buildings[:, 0], buildings[:, 1])
+            i = int(np.argmax(buildings[np.argmax(rows)])) + 1
+            reason = f"a building_id with another {name} than in an earlier row"
+            columns = tuple(f"{column}_{i}" for column in ("building_id", *_SEEN_IN[name]))
+            yield _Odd("contradicting_building", "", reason, rows, columns)
 
     def sentences(self) -> list[str]:
         """Return a sentence per suspicion, with the file's name where there are several."""
@@ -259,32 +347,6 @@ class Suspicions:
         for account in self._files.values():
             units |= account.units()
         return units
-
-
-class _Places:
-    """Positions of the pairs of some rows: distance, m, and direction, degrees from north."""
-
-    def __init__(self, numbers: _Numbers) -> None:
-        self.longitude = (numbers["longitude_1"], numbers["longitude_2"])
-        self.latitude = (numbers["latitude_1"], numbers["latitude_2"])
-        with np.errstate(invalid="ignore", over="ignore"):
-            in_range = [np.abs(degrees) <= 180.0 for degrees in self.longitude]
-            in_range += [np.abs(degrees) <= 90.0 for degrees in self.latitude]
-            self.is_valid = np.logical_and.reduce(in_range)
-            # Distance on a sphere taken as flat, across the date line too
-            north = self.latitude[1] - self.latitude[0]
-            east = (self.longitude[1] - self.longitude[0] + 180.0) % 360.0 - 180.0
-            east *= np.cos(np.deg2rad(self.latitude[0]))
-            distance = METRES_PER_DEGREE * np.hypot(north, east)
-            self.is_valid &= distance <= LARGEST_SEPARATION
-        self.distance = np.where(self.is_valid, distance, np.nan)
-        self.direction = np.rad2deg(np.arctan2(east, north))
-
-    def angle_to(self, azimuth: FloatArray) -> FloatArray:
-        """Return the angle between azimuths and the lines between positions, 0 to 180 degrees."""
-        with np.errstate(invalid="ignore"):
-            angle = np.abs((azimuth - self.direction + 180.0) % 360.0 - 180.0)
-            return np.where(self.distance >= LINE, angle, np.nan)
 
 
 # numpy compares NaN as false, which is meant throughout the rules: a missing value is not odd.
@@ -311,123 +373,84 @@ def _odd_gaps(numbers: _Numbers, place: _Places) -> Iterator[_Odd]:
 def _odd_places(numbers: _Numbers, place: _Places) -> Iterator[_Odd]:
     """Yield rows with positions or an azimuth that do not fit neighbours."""
     corners = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
-    yield _Odd(
-        "odd_positions",
-        "",
-        "both buildings at one position",
-        place.distance < SAME_PLACE,
-        corners[:2],
-    )
-    limit = np.full(len(place.distance), FAR_APART)
+    equal = place.distance < SAME_PLACE
+    yield _Odd("odd_positions", "", "both buildings at one position", equal, corners[:2])
+    # By the areas where both are known
+    far = place.distance - np.nan_to_num(np.clip(numbers["gap"], 0.0, 10.0)) > FAR_APART
     if numbers.has("area_1", "area_2"):
-        with np.errstate(invalid="ignore"):
-            roots = np.sqrt(numbers["area_1"]) + np.sqrt(numbers["area_2"])
-        by_area = np.maximum(PER_ROOT_AREA * roots, SMALLEST_FAR)
-        limit = np.where(np.isnan(by_area), limit, by_area)
-    gap = np.nan_to_num(np.clip(numbers["gap"], 0.0, 10.0))
-    far = place.distance - gap > limit
-    yield _Odd("odd_positions", "", "positions too far apart for the gap", far, (*corners, "gap"))
+        beyond = place.beyond(numbers, PER_ROOT_AREA)
+        far = np.where(np.isnan(beyond), far, (beyond > 0.0) & (place.distance > SMALLEST_FAR))
+    columns = (*corners, "gap")
+    yield _Odd("odd_positions", "", "positions too far apart for the gap", far, columns)
+    # A contact may lie aside of the centres, but hardly across
     if numbers.has("azimuth"):
         across = place.angle_to(numbers["azimuth"]) > ACROSS
         reason = "the azimuth is across or against the line between the positions"
         yield _Odd("odd_azimuth", "azimuths", reason, across, ("azimuth", *corners))
 
 
-def _odd_sizes(numbers: _Numbers) -> Iterator[_Odd]:
-    """Yield rows with an odd height, number of storeys, contact height or floor offset."""
-    for i in (1, 2):
-        names = height_name, storeys_name = f"height_{i}", f"storeys_{i}"
-        height, storeys = numbers[height_name], numbers[storeys_name]
-        towers = (height > TOWER) & (height <= COLUMNS[height_name].high)
-        yield _Odd(
-            "odd_height", height_name, f"{height_name} above {TOWER:g} m", towers, (height_name,)
-        )
-        if not numbers.has(storeys_name):
-            continue
-        # Halves are usual for attics
-        decimals = (storeys >= 1.0) & (2.0 * storeys % 1.0 != 0.0)
-        yield _Odd("odd_height", "", f"{storeys_name} with decimals", decimals, (storeys_name,))
-        high = (height > HIGH_STOREY * storeys) & (storeys >= 2.0)
-        yield _Odd(
-            "odd_height", "heights", f"storeys above {HIGH_STOREY:g} m, in feet?", high, names
-        )
+def _odd_sizes(numbers: _Numbers, i: int) -> Iterator[_Odd]:
+    """Yield rows with an odd height or number of storeys of building i."""
+    names = height_name, storeys_name = f"height_{i}", f"storeys_{i}"
+    height, storeys = numbers[height_name], numbers[storeys_name]
+    # Higher ones are rejected
+    tower = (height > TOWER) & (height <= COLUMNS[height_name].high)
+    yield _Odd("odd_height", height_name, f"{height_name} above {TOWER:g} m", tower, names[:1])
+    if not numbers.has(storeys_name):
+        return
+    # Halves are usual for attics
+    decimals = (storeys >= 1.0) & (2.0 * storeys != np.floor(2.0 * storeys))
+    yield _Odd("odd_height", "", f"{storeys_name} with decimals", decimals, names[1:])
+    high = (height > HIGH_STOREY * storeys) & (storeys >= 2.0)
+    reason = f"{height_name} makes floors above {HIGH_STOREY:g} m, in feet?"
+    yield _Odd("odd_height", "heights", reason, high, names)
+
+
+def _odd_contacts(numbers: _Numbers) -> Iterator[_Odd]:
+    """Yield rows with an odd contact height or floor offset."""
     if numbers.has("contact_height"):
         # One storey more, as some count them above the ground floor
         storeys = np.fmin(numbers["storeys_1"], numbers["storeys_2"])
-        known = np.fmin(numbers["height_1"], numbers["height_2"])
-        above = (numbers["contact_height"] > 5.0 * (storeys + 1.0)) & np.isnan(known)
+        unknown = np.isnan(np.fmin(numbers["height_1"], numbers["height_2"]))
+        above = unknown & (numbers["contact_height"] > 5.0 * (storeys + 1.0))
         columns = ("contact_height", "storeys_1", "storeys_2")
-        yield _Odd(
-            "odd_height", "contact_height", "contact_height above the lower roof", above, columns
-        )
-    if numbers.has("floor_offset"):
+        reason = "contact_height above the lower roof"
+        yield _Odd("odd_height", "contact_height", reason, above, columns)
+    if numbers.has(name := "floor_offset"):
         # The nearest floor is at most half a storey away
-        offset = np.abs(numbers["floor_offset"])
         with np.errstate(divide="ignore", invalid="ignore"):
             storey = np.fmax(*(numbers[f"height_{i}"] / numbers[f"storeys_{i}"] for i in (1, 2)))
         half = np.where(np.isnan(storey), STOREY, storey / 2.0 + 0.1)
-        yield _Odd(
-            "odd_height",
-            "floor_offset",
-            "floor_offset above half a storey",
-            offset > half,
-            ("floor_offset",),
-        )
+        large = np.abs(numbers[name]) > half
+        yield _Odd("odd_height", name, f"{name} above half a storey", large, (name,))
 
 
-def _odd_oscillators(numbers: _Numbers) -> Iterator[_Odd]:
-    """Yield rows with an odd period, damping, mass, strength or participation of a building."""
-    limits = {"damping": 0.3, "yield_coefficient": 1.0, "participation": 2.0}
-    for i in (1, 2):
-        if numbers.has(f"period_{i}"):
-            ratio = _period_ratio(numbers, i)
-            odd = (ratio > ODD_PERIOD) | (ratio < 1.0 / ODD_PERIOD)
-            columns = [f"period_{i}", *_given(numbers, f"height_{i}", f"storeys_{i}")]
-            yield _Odd(
-                "odd_period", "periods", f"period_{i} does not fit the height", odd, tuple(columns)
-            )
-        for name, limit in limits.items():
-            if numbers.has(column := f"{name}_{i}"):
-                above = (numbers[column] > limit) & (numbers[column] <= COLUMNS[column].high)
-                yield _Odd("odd_building", column, f"{column} above {limit:g}", above, (column,))
-        if numbers.has(column := f"mass_{i}"):
-            mass, low, high = _storey_mass(numbers, i), *STOREY_MASS
-            odd = (mass < low) | (mass > high)
-            yield _Odd("odd_building", "masses", f"{column} is odd for its storeys", odd, (column,))
-        if numbers.has(column := f"yield_displacement_{i}"):
-            # A twentieth of the height is a drift of collapse, not of yield
-            limit_height = np.nan_to_num(_height(numbers, i), nan=20.0)
-            far = (numbers[column] > 0.05 * limit_height) & np.isfinite(numbers[column])
-            yield _Odd("odd_building", column, f"{column} above 5 % of the height", far, (column,))
+def _odd_oscillators(numbers: _Numbers, i: int) -> Iterator[_Odd]:
+    """Yield rows with an odd period, damping, strength or participation of building i."""
+    # Stiffer or softer than any building but an isolated one
+    ratio = numbers.period_ratio(i)
+    odd = (ratio > ODD_PERIOD) | (ratio < 1.0 / ODD_PERIOD)
+    sizes = [name for name in (f"height_{i}", f"storeys_{i}") if numbers.has(name)]
+    reason = f"period_{i} does not fit the height"
+    yield _Odd("odd_period", "periods", reason, odd, (f"period_{i}", *sizes))
+    # Limits of single values
+    for name, limit in {"damping": 0.3, "yield_coefficient": 1.0, "participation": 2.0}.items():
+        if numbers.has(column := f"{name}_{i}"):
+            above = (numbers[column] > limit) & (numbers[column] <= COLUMNS[column].high)
+            yield _Odd("odd_building", column, f"{column} above {limit:g}", above, (column,))
 
 
-def _given(numbers: _Numbers, *names: str) -> Iterator[str]:
-    """Yield those of some columns that the table has."""
-    return (name for name in names if numbers.has(name))
-
-
-def _height(numbers: _Numbers, i: int) -> FloatArray:
-    """Return heights of building i, m, from storeys where they are not given."""
-    height = numbers[f"height_{i}"]
-    if not numbers.has(f"storeys_{i}"):
-        return height
-    return np.where(np.isnan(height), STOREY * numbers[f"storeys_{i}"], height)
-
-
-def _period_ratio(numbers: _Numbers, i: int) -> FloatArray:
-    """Return periods of building i over those of frames of its height."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        frame = FRAME_PERIOD * np.maximum(_height(numbers, i), 0.0) ** FRAME_EXPONENT
-        return numbers[f"period_{i}"] / frame
-
-
-def _storey_mass(numbers: _Numbers, i: int) -> FloatArray:
-    """Return masses of building i per storey, kg."""
-    storeys = np.maximum(numbers[f"storeys_{i}"], 1.0)
-    counted = np.maximum(numbers[f"height_{i}"] / STOREY, 1.0)
-    return numbers[f"mass_{i}"] / np.nan_to_num(
-        np.where(np.isnan(storeys), counted, storeys), nan=1
-    )
+def _odd_masses(numbers: _Numbers, i: int) -> Iterator[_Odd]:
+    """Yield rows with an odd mass or yield displacement of building i."""
+    if numbers.has(column := f"mass_{i}"):
+        mass = numbers.storey_mass(i)
+        odd = (mass < STOREY_MASS[0]) | (mass > STOREY_MASS[1])
+        yield _Odd("odd_building", "masses", f"{column} is odd for its storeys", odd, (column,))
+    if numbers.has(column := f"yield_displacement_{i}"):
+        # A twentieth of the height is a drift of collapse, not of yield
+        far = numbers[column] > 0.05 * np.nan_to_num(numbers.height(i), nan=20.0)
+        far &= np.isfinite(numbers[column])
+        yield _Odd("odd_building", column, f"{column} above 5 % of the height", far, (column,))
 
 
 class _FileAccount:
@@ -446,51 +469,47 @@ class _FileAccount:
         self._cells = np.zeros(360 * 180, dtype=np.int64)
         self._cell_line = np.full(360 * 180, _INT_MAX)
 
-    def add_rows(
-        self,
-        found: list[_Odd],
-        table: pa.Table,
-        lines: NDArray[np.int64],
-        earlier_line: NDArray[np.int64],
-    ) -> None:
+    def add_rows(self, found: list[_Odd], table: pa.Table, lines: NDArray[np.int64]) -> None:
         """Add rows that are odd by themselves."""
         self.rows += len(table)
         for one in found:
             key = one.subject, one.reason
             self._odd[key] += _number(one.rows)
-            if key in self._first:
-                continue
-            row = int(np.argmax(one.rows))
-            cells = [_quoted(table, name, row) for name in one.columns]
-            if one.flag == "repeated_pair":
-                cells = [f"line {earlier_line[row]}"]
-            self._first[key] = f"first in line {lines[row]}: {', '.join(cells)}"
+            if key not in self._first:
+                # Later chunks do not change the first one
+                row = int(np.argmax(one.rows))
+                cells = [_quoted(table, name, row) for name in one.columns]
+                quoted = one.example or ", ".join(cells)
+                self._first[key] = f"first in line {lines[row]}: {quoted}"
 
     def add_columns(self, numbers: _Numbers, place: _Places, lines: NDArray[np.int64]) -> None:
         """Add the counts of whole columns."""
+        self._add_limits(numbers)
+        self._add_gaps(numbers["gap"])
+        self._is_drawn |= numbers.has("gap_std_source")
+        # Quantities of buildings and of their places
+        for i in (1, 2):
+            self._add_building(numbers, place, i)
+        if numbers.has("azimuth"):
+            self._add_azimuths(numbers["azimuth"], place)
+        if numbers.has("area_1", "area_2"):
+            beyond = place.beyond(numbers, CLOSE_FOR_AREA)
+            beyond[(place.distance < LINE) | (numbers["gap"] > WIDE_GAP)] = np.nan
+            self._count["area"]["all"] += _number(~np.isnan(beyond))
+            self._count["area"]["close"] += _number(beyond < 0.0)
+        self._add_cells(place, lines)
+
+    def _add_limits(self, numbers: _Numbers) -> None:
+        """Add the numbers above limits."""
         for name in (one for one in COLUMNS if numbers.has(one)):
             bare = name.removesuffix("_1").removesuffix("_2")
-            limits = [limit.above for limit in _LIMITS if limit.column == bare]
-            if limits:
+            if limits := [limit.above for limit in _LIMITS if limit.column == bare]:
                 # Infinite strength is no number of another unit
                 values, count = np.abs(numbers[name]), self._count[name]
                 values = np.where(values < 1e9, values, 0.0)
                 count["above 0"] += _number(values > 0.0)
                 for above in limits:
                     count[f"above {above}"] += _number(values > above)
-        self._add_gaps(numbers["gap"])
-        self._is_drawn |= numbers.has("gap_std_source")
-        for i in (1, 2):
-            self._add_building(numbers, place, i)
-        self._add_azimuths(numbers, place)
-        if numbers.has("area_1", "area_2"):
-            with np.errstate(invalid="ignore"):
-                roots = np.sqrt(numbers["area_1"]) + np.sqrt(numbers["area_2"])
-                clear = place.distance - np.nan_to_num(numbers["gap"])
-            apart = (place.distance >= LINE) & np.isfinite(roots)
-            self._count["area"]["all"] += _number(apart)
-            self._count["area"]["close"] += _number(apart & (clear < CLOSE_FOR_AREA * roots))
-        self._add_cells(place, lines)
 
     def _add_gaps(self, gap: FloatArray) -> None:
         """Add the numbers of gaps that are round in metres, in quarters and in twelfths."""
@@ -504,70 +523,77 @@ class _FileAccount:
         twelfths = np.rint(12.0 * gap)
         is_twelfth = np.abs(12.0 * gap - twelfths) < 0.0601
         count["twelfths"] += _number(is_twelfth)
-        if is_twelfth.any() and len(self._twelfths) < 6:
+        if len(self._twelfths) < 6:
+            # Quarters are twelfths too, and no evidence
             inches = np.unique(twelfths[is_twelfth & (twelfths <= 120.0)])
             self._twelfths |= {int(inch) for inch in inches.tolist() if inch % 3}
 
     def _add_building(self, numbers: _Numbers, place: _Places, i: int) -> None:
-        """Add the numbers of odd storeys, periods, masses, and of heights without either."""
-        height, count = numbers[f"height_{i}"], self._count["height"]
-        alone = (height > 0.0) & (height < 1e6)
-        if numbers.has(name := f"storeys_{i}"):
-            storeys = numbers[name]
-            alone &= np.isnan(storeys)
-            counted = (storeys >= 2.0) & (height > 0.0)
-            count["storeys"] += _number(counted)
-            count["high storeys"] += _number(counted & (height > HIGH_STOREY * storeys))
-        if numbers.has(name := f"period_{i}"):
-            alone &= np.isnan(numbers[name])
-            self._add_periods(numbers, i)
+        """Add the numbers of odd storeys, periods and masses, and heights without them."""
+        # Halls of one storey may have any height
+        height, storeys = numbers[f"height_{i}"], numbers[f"storeys_{i}"]
+        count, mass_count = self._count["height"], self._count["mass"]
+        counted = (storeys >= 2.0) & (height > 0.0)
+        count["storeys"] += _number(counted)
+        count["high storeys"] += _number(counted & (height > HIGH_STOREY * storeys))
+        # Periods and masses by the height
+        period = numbers[f"period_{i}"]
+        self._add_periods(period, numbers.period_ratio(i))
         if numbers.has(f"mass_{i}"):
-            mass = _storey_mass(numbers, i)
-            self._count["mass"]["all"] += _number(mass > 0.0)
-            self._count["mass"]["light"] += _number(mass < STOREY_MASS[0])
-        # Heights without storeys and period: feet, or numbers of storeys
-        if not alone.any():
-            return
-        count["alone"] += _number(alone)
-        count["low"] += _number(alone & (height < LOWEST_FEET))
-        count["high"] += _number(alone & (height > HIGH_FEET))
-        apart = alone & (place.distance >= LINE)
-        count["apart"] += _number(apart)
-        count["slender"] += _number(apart & (height > SLENDER * place.distance))
-        count["whole"] += _number(alone & (height == np.floor(height)) & (height <= 60.0))
-        count["one or two"] += _number(alone & (height <= 2.0))
+            mass = numbers.storey_mass(i)
+            mass_count["all"] += _number(mass > 0.0)
+            mass_count["light"] += _number(mass < STOREY_MASS[0])
+        alone = (height > 0.0) & (height < 1e6) & np.isnan(storeys) & np.isnan(period)
+        if alone.any():
+            self._add_heights(height[alone], place.distance[alone])
 
-    def _add_periods(self, numbers: _Numbers, i: int) -> None:
+    def _add_heights(self, height: FloatArray, distance: FloatArray) -> None:
+        """Add heights without storeys and period, which may be in feet, or numbers of storeys."""
+        count = self._count["height"]
+        count["alone"] += height.size
+        count["low"] += _number(height < LOWEST_FEET)
+        count["high"] += _number(height > HIGH_FEET)
+        count["apart"] += _number(distance >= LINE)
+        count["slender"] += _number((distance >= LINE) & (height > SLENDER * distance))
+        # Numbers of storeys are whole, and often 1 or 2
+        count["whole"] += _number((height == np.floor(height)) & (height <= 60.0))
+        count["one or two"] += _number(height <= 2.0)
+
+    def _add_periods(self, period: FloatArray, ratio: FloatArray) -> None:
         """Add the numbers of periods that are too short, or would fit as frequencies."""
-        period, count = numbers[f"period_{i}"], self._count["period"]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio, logarithm = np.log(_period_ratio(numbers, i)), np.log(period)
-        # Period and frequency are alike near 1
-        decides = np.isfinite(ratio) & (np.abs(logarithm) > 0.35)
-        as_frequency = np.abs(2.0 * logarithm - ratio) < np.abs(ratio)
-        count["all"] += _number(np.isfinite(ratio))
+        count = self._count["period"]
+        possible = ~np.isnan(ratio)
+        period, ratio = np.log(period[possible]), np.log(ratio[possible])
+        # Period and frequency are alike near 1; heights in feet make periods of frames longer
+        decides = np.abs(period) > 0.35
+        in_feet = np.abs(ratio - FRAME_EXPONENT * np.log(0.3048))
+        as_frequency = np.abs(2.0 * period - ratio) < np.minimum(np.abs(ratio), in_feet)
+        count["all"] += period.size
         count["decides"] += _number(decides)
         count["frequency"] += _number(decides & as_frequency)
         count["short"] += _number(ratio < np.log(SHORT_PERIOD))
 
-    def _add_azimuths(self, numbers: _Numbers, place: _Places) -> None:
-        """Add the numbers of azimuths that fit the positions, or would in another form."""
-        if not numbers.has("azimuth"):
-            return
-        azimuth, count = numbers["azimuth"], self._count["azimuth"]
-        turns = {"": azimuth, "backwards": azimuth + 180.0, "from east": 90.0 - azimuth}
+    def _add_azimuths(self, azimuth: FloatArray, place: _Places) -> None:
+        """Add the numbers of azimuths that do not fit the positions, and of other forms that do."""
+        count = self._count["azimuth"]
         angle = place.angle_to(azimuth)
+        astray = angle > FITS
         count["compared"] += _number(angle >= 0.0)
-        for name, turned in turns.items():
-            count[f"fits {name}"] += _number(place.angle_to(turned) <= FITS)
-        count["fits along the wall"] += _number(np.abs(angle - 90.0) < 90.0 - FITS)
-        above = azimuth > 0.0
-        small = above & (azimuth <= 2.0 * np.pi + 0.01)
-        count["all"] += _number(above)
-        count["small"] += _number(small)
+        count["astray"] += _number(astray)
+        backwards = _number(angle >= 180.0 - FITS)
+        count["backwards"] += backwards
+        count["along the wall"] += _number(astray) - backwards
+        # A circle has 2 pi radians, to two decimals
+        small = azimuth <= 2.0 * np.pi + 0.01
+        count["all"] += _number(azimuth > 0.0)
+        count["small"] += _number(small & (azimuth > 0.0))
         count["decimals"] += _number(small & (azimuth != np.floor(azimuth)))
-        radians = np.rad2deg(np.where(small | (azimuth == 0.0), azimuth, np.nan))
-        count["fits in radians"] += _number(place.angle_to(radians) <= FITS)
+        # Other forms of the azimuths that do not fit
+        if astray.any():
+            east = np.where(astray, 90.0 - azimuth, np.nan)
+            radians = np.where(astray & small, np.rad2deg(azimuth), np.nan)
+            count["from east"] += _number(place.angle_to(east) <= FITS)
+            count["in radians"] += _number(place.angle_to(radians) <= FITS)
 
     def _add_cells(self, place: _Places, lines: NDArray[np.int64]) -> None:
         """Add the pairs of each cell of one degree."""
@@ -593,13 +619,13 @@ class _FileAccount:
 
     def units(self) -> dict[str, str]:
         """Return the units that the columns may have."""
-        units = {
-            name: limit.unit for name, limit, above, every in self._limits() if 2 * above > every
-        }
+        columns = self._limits()
+        units = {name: limit.unit for name, limit, above, every in columns if 2 * above > every}
         if unit := self._round_gaps()[0]:
             units.setdefault("gap", unit)
+        # Of both buildings together
         for i in (1, 2):
-            if self._feet():
+            if self._feet()[0]:
                 units.setdefault(f"height_{i}", "ft")
             if self._is_light():
                 units.setdefault(f"mass_{i}", "t")
@@ -613,30 +639,33 @@ class _FileAccount:
         every = count["all"]
         if every < FEWEST:
             return "", ""
+        # Outlines and tapes do not give round gaps only
         if count["whole"] == every:
             return "cm", "are whole metres: given in centimetres or millimetres"
-        if count["quarters"] == every and 2 * count["metres"] > every:
+        if every > FEWEST and count["quarters"] == every and 2 * count["metres"] > every:
             return "in", "are quarters of a metre, most of them above 1 m: given in inches"
         if count["twelfths"] == every and len(self._twelfths) >= 3:
             return "ft", "are twelfths of a metre, as inches are of a foot: given in feet"
         return "", ""
 
-    def _feet(self) -> str:
-        """Return why heights may be in feet, empty if they may not."""
+    def _feet(self) -> tuple[str, str]:
+        """Return why heights may be in feet, with the subject; empty if they may not."""
         count, period = self._count["height"], self._count["period"]
         if 2 * count["high storeys"] > count["storeys"]:
-            of = f"{count['high storeys']} of {count['storeys']}"
-            return f"heights: {of} with two storeys or more make floors above {HIGH_STOREY:g} m"
-        alone = count["alone"]
-        slender = 2 * count["slender"] > count["apart"] or not count["apart"]
-        few_low, mostly_high = 50 * count["low"] <= alone, 2 * count["high"] > alone
-        if alone > FEWEST and few_low and mostly_high and slender:
-            low = f"{count['low']} of {alone} without storeys are below {LOWEST_FEET:g} m"
-            return f"heights: {low} and {count['high']} above {HIGH_FEET:g} m"
-        if period["all"] > 3 and 2 * period["short"] > period["all"]:
-            of = f"{period['short']} of {period['all']}"
-            return f"periods: {of} are below {SHORT_PERIOD:g} of what the heights suggest"
-        return ""
+            of = f"{count['high storeys']} of {count['storeys']} with two storeys or more"
+            return "heights", f"{of} make floors above {HIGH_STOREY:g} m"
+        # Neither storeys nor periods tell it: hardly any is low, most are high and slender
+        alone, low, high = count["alone"], count["low"], count["high"]
+        is_slender = 2 * count["slender"] > count["apart"] or not count["apart"]
+        if is_slender and alone > FEWEST and 50 * low <= alone < 2 * high:
+            of = f"{low} of {alone} without storeys are below {LOWEST_FEET:g} m"
+            return "heights", f"{of} and {high} above {HIGH_FEET:g} m"
+        # Periods of lower buildings
+        short, every = period["short"], period["all"]
+        if 3 < every < 2 * short:
+            fit = f"are below {SHORT_PERIOD:g} of what the heights suggest"
+            return "periods", f"{short} of {every} {fit}"
+        return "", ""
 
     def _is_light(self) -> bool:
         """Return whether most masses are too small for kilograms."""
@@ -645,26 +674,23 @@ class _FileAccount:
     def _azimuth_form(self) -> str:
         """Return the form in which azimuths fit the positions, empty if it is the right one."""
         count = self._count["azimuth"]
-        compared, fitting = count["compared"], count["fits "]
+        compared, astray, every = count["compared"], count["astray"], count["all"]
         if compared >= 3:
+            # Where the azimuth of an axis is given, half of them point backwards
+            if 4 * astray < compared:
+                return ""
             forms = ("in radians", "backwards", "from east", "along the wall")
-            best = max(forms, key=lambda form: count[f"fits {form}"])
-            is_better = 5 * count[f"fits {best}"] >= 4 * compared and 2 * fitting <= compared
-            if is_better:
-                return best
-            # Directions of an axis are 0 to 180: half of them point backwards
-            if 4 * count["fits backwards"] > compared and 5 * fitting <= 4 * compared:
-                return "partly backwards"
-            return "anyhow" if 2 * fitting < compared else ""
-        every = count["all"]
+            best = max(forms, key=lambda form: count[form])
+            return best if 10 * count[best] >= 9 * astray else "any way"
         is_small = every >= FEWEST and count["small"] == every and count["decimals"]
         return "in radians" if is_small else ""
 
     def sentences(self) -> list[str]:
         """Return a sentence per suspicion, of columns first: their rows are not repeated."""
-        columns = [*self._gap_sentence(), *self._limit_sentences()]
-        columns += [*self._building_sentences(), *self._azimuth_sentence()]
+        columns = [*self._gap_sentence(), *self._limit_sentences(), *self._height_sentence()]
+        columns += [*self._mass_sentences(), *self._azimuth_sentence()]
         explained = {subject for subject, _ in columns}
+        # Odd rows by their reason
         rows = [
             f"{reason}: {count} of {self.rows} rows, {self._first[subject, reason]}"
             for (subject, reason), count in self._odd.items()
@@ -675,39 +701,49 @@ class _FileAccount:
     def _gap_sentence(self) -> Iterator[tuple[str, str]]:
         """Yield a sentence about gaps that are wide or round, with its subject."""
         wide, every = self._count["gap"][f"above {WIDE_GAP}"], self._count["gap"]["all"]
-        reason = self._round_gaps()[1]
+        unit, reason = self._round_gaps()
+        # Wide ones are more certain
         if 2 * wide > every and "gap" in self.units():
             mend = "given in centimetres or millimetres?"
             yield "gaps", f"{wide} of {every} gaps above 0 are wider than {WIDE_GAP:g} m: {mend}"
-        elif reason:
+        elif unit:
             yield "gaps", f"all {every} gaps above 0 {reason}?"
 
     def _limit_sentences(self) -> Iterator[tuple[str, str]]:
         """Yield a sentence per column that mostly exceeds a limit, with its subject."""
         units = self.units()
         for name, limit, above, every in self._limits():
+            # Of several limits the last one
             if 2 * above > every and units[name] == limit.unit and name != "gap":
                 unit = COLUMNS[name].unit.replace("1", "")
                 of = f"{above} of {every} above {limit.above:g} {unit}".strip()
                 yield name, f"{name}: {of}: given in {_UNIT_WORDS[limit.unit]}?"
 
-    def _building_sentences(self) -> Iterator[tuple[str, str]]:
-        """Yield sentences about heights, periods, masses and areas together, with the subjects."""
-        height, period, mass = (self._count[name] for name in ("height", "period", "mass"))
-        feet = self._feet()
-        if period["decides"] > 2 and 2 * period["frequency"] > period["decides"]:
+    def _height_sentence(self) -> Iterator[tuple[str, str]]:
+        """Yield a sentence about heights and periods together, with its subject."""
+        height, period = self._count["height"], self._count["period"]
+        subject, feet = self._feet()
+        whole, few = height["whole"], height["one or two"]
+        # Storeys decide before periods do
+        if subject == "heights":
+            yield subject, f"heights: {feet}: given in feet?"
+        elif period["decides"] > 2 and 2 * period["frequency"] > period["decides"]:
             of = f"{period['frequency']} of {period['decides']}"
             yield "periods", f"periods: {of} fit the heights better as frequencies: given in Hz?"
-        elif feet:
-            yield feet.partition(":")[0], f"{feet}: heights given in feet?"
-        alone = height["alone"]
-        if alone > FEWEST and height["whole"] == alone and height["one or two"]:
-            few = f"{height['one or two']} of them 1 or 2"
-            yield "heights", f"heights: all {alone} are whole metres, {few}: numbers of storeys?"
+        elif subject:
+            yield subject, f"periods: {feet}: heights given in feet?"
+        # Heights that are numbers of storeys
+        if height["alone"] > FEWEST and whole == height["alone"] and few:
+            of = f"all {whole} are whole metres, {few} of them 1 or 2"
+            yield "heights", f"heights: {of}: numbers of storeys?"
+
+    def _mass_sentences(self) -> Iterator[tuple[str, str]]:
+        """Yield sentences about masses and areas, with the subjects."""
+        mass, area = self._count["mass"], self._count["area"]
         if self._is_light():
             of = f"{mass['light']} of {mass['all']} below {STOREY_MASS[0]:g} kg per storey"
             yield "masses", f"masses: {of}: given in tonnes or kN?"
-        area = self._count["area"]
+        # Large areas of close centres
         if area["all"] >= FEWEST and 2 * area["close"] > area["all"]:
             of = f"{area['close']} of {area['all']} pairs are too close for them"
             yield "areas", f"areas: {of}: in square feet, or of all storeys?"
@@ -716,50 +752,44 @@ class _FileAccount:
         """Yield a sentence about azimuths that do not follow the positions, with its subject."""
         form, count = self._azimuth_form(), self._count["azimuth"]
         meant = "degrees clockwise from north, from building 1 to building 2, are expected"
-        of = f"azimuths: {count['fits ']} of {count['compared']} follow the positions"
         if form == "in radians" and count["compared"] < 3:
             yield "azimuths", f"azimuths: all {count['all']} are at most 2 pi: given in radians?"
-        elif form and f"fits {form}" in count:
-            east = " counter-clockwise" if form == "from east" else ""
-            better = f"{count[f'fits {form}']} would if given {form}{east}"
-            yield "azimuths", f"{of}, {better}: {meant}"
         elif form:
-            opposite = f"{count['fits backwards']} the opposite direction"
-            yield "azimuths", f"{of}, {opposite}: {meant}"
+            # How many would follow the positions in another form
+            others = f"{count['astray']} of {count['compared']} do not follow the positions"
+            east = " counter-clockwise" if form == "from east" else ""
+            better = f", {count[form]} would if given {form}{east}" if count[form] else ""
+            yield "azimuths", f"azimuths: {others}{better}: {meant}"
 
     def _mirrored(self) -> Iterator[str]:
         """Yield a sentence per way in which few pairs mirror the place of many."""
-        grid = self._cells.reshape(360, 180)
+        cells = np.flatnonzero(self._cells)
+        east, north = cells // 180 - 180, cells % 180 - 90
+        here = self._around(east, north)
+        # Cells of the other side: from -n to 1 - n, whose lower edge is -n
         ways = {
-            "longitude has lost its sign": lambda east, north: (-east - 1, north),
-            "latitude has lost its sign": lambda east, north: (east, -north - 1),
-            "both signs are lost": lambda east, north: (-east - 1, -north - 1),
-            "longitude and latitude are exchanged": lambda east, north: (north, east),
+            "longitude has lost its sign": (-east - 1, north),
+            "latitude has lost its sign": (east, -north - 1),
+            "both have lost their sign": (-east - 1, -north - 1),
+            "longitude and latitude are exchanged": (north, east),
         }
-        cells = np.argwhere(grid) - (180, 90)
-        for way, mirror in ways.items():
-            few, first, many = 0, _INT_MAX, 0
-            for east, north in cells.tolist():
-                other = mirror(east, north)
-                is_near = max(abs(other[0] - east), abs(other[1] - north)) <= MIRROR
-                if is_near or abs(other[1]) > 90:
-                    continue
-                here, there = _pairs_around(grid, east, north), _pairs_around(grid, *other)
-                if 0 < here <= FEW_MIRRORED * there:
-                    few += int(grid[east + 180, north + 90])
-                    many = max(many, there)
-                    line = self._cell_line[(east + 180) * 180 + north + 90]
-                    first = min(first, int(line))
-            if few:
-                pairs = f"{few} pairs, the first in line {first}, mirror the place of {many} others"
-                yield f"positions: {pairs}, as if {way}"
+        for way, (to_east, to_north) in ways.items():
+            # Next to the Greenwich meridian and the equator both sides may be one town
+            is_far = np.maximum(np.abs(to_east - east), np.abs(to_north - north)) > MIRROR
+            few = cells[is_far & (here <= FEW_MIRRORED * self._around(to_east, to_north))]
+            if few.size:
+                of = f"{self._cells[few].sum()} of {self._cells.sum()} pairs"
+                first = f"first in line {self._cell_line[few].min()}, far from the others"
+                yield f"positions: {of}, {first}, as if {way}"
 
-
-def _pairs_around(grid: NDArray[np.int64], east: int, north: int) -> int:
-    """Return the pairs in a cell and the eight around it."""
-    columns = np.arange(east + 179, east + 182) % 360
-    rows = slice(max(north + 89, 0), north + 92)
-    return int(grid[columns, rows].sum())
+    def _around(self, east: NDArray[np.int64], north: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the pairs in cells of one degree and the eight around each."""
+        grid = np.pad(self._cells.reshape(360, 180), ((0, 0), (1, 1)))
+        # Beyond the poles is no cell, beyond the date line is the first one
+        rows = north[:, None] + 91 + np.array([-1, 0, 1])
+        rows = np.where(np.abs(north[:, None]) > 90, 0, np.clip(rows, 0, 181))
+        columns = (east[:, None] + 180 + np.array([-1, 0, 1])) % 360
+        return np.asarray(grid[columns[:, :, None], rows[:, None, :]].sum(axis=(1, 2)))
 
 
 def _number(mask: NDArray[np.bool_]) -> int:
@@ -769,9 +799,8 @@ def _number(mask: NDArray[np.bool_]) -> int:
 
 def _quoted(table: pa.Table, name: str, row: int) -> str:
     """Return a cell as it is quoted in a sentence."""
-    if name not in table.column_names:
-        return f"{name} is empty"
-    value = table[name][row].as_py()
+    value = table[name][row].as_py() if name in table.column_names else ""
+    # Text of a number stays as it is
     if isinstance(value, float):
         unit = COLUMNS[name].unit.replace("1", "").replace("degrees", "")
         return f"{name} = {value:.9g} {unit}".rstrip()

@@ -130,13 +130,12 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
         raise CatalogError("table", "the table has no rows")
     table = table.reset_index(drop=True)
     # Cells of any type as the file of such a table would have them
-    known = {name: table[name] for name in table if name in COLUMNS}
-    cells = {
-        name: plain_numbers(column)
-        if COLUMNS[name].dtype == "float64"
-        else column.astype(str).mask(column.isna())
-        for name, column in known.items()
-    }
+    cells = {}
+    for name in (known for known in table if known in COLUMNS):
+        is_text = COLUMNS[name].dtype == "str"
+        texts = table[name].astype(str).mask(table[name].isna())
+        cells[name] = texts if is_text else plain_numbers(table[name])
+    # As if it followed a header
     lines = np.arange(2, len(table) + 2)
     account, repeated = Suspicions(), table[IDENTIFIER].duplicated().to_numpy(dtype=bool)
     raw = pa.Table.from_pandas(pd.DataFrame(cells), preserve_index=False)
