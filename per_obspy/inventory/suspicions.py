@@ -103,7 +103,7 @@ class _Limit(NamedTuple):
 #: Of each column the last one that holds.
 _LIMITS = (
     _Limit("gap", WIDE_GAP, "cm"), _Limit("gap", 100.0, "mm"), _Limit("gap_std", 0.5, "cm"),
-    _Limit("height", TOWER, "cm"), _Limit("height", 2000.0, "mm"),
+    _Limit("height", TOWER, "cm"), _Limit("height", 5000.0, "mm"),
     _Limit("contact_height", TOWER, "cm"), _Limit("period", 20.0, "ms"),
     _Limit("damping", 0.3, "%"), _Limit("restitution", 1.0, "%"),
     _Limit("participation", 3.0, "%"), _Limit("yield_coefficient", 1.0, "%"),
@@ -580,14 +580,12 @@ class _FileAccount:
         astray = angle > FITS
         count["compared"] += _number(angle >= 0.0)
         count["astray"] += _number(astray)
-        backwards = _number(angle >= 180.0 - FITS)
-        count["backwards"] += backwards
-        count["along the wall"] += _number(astray) - backwards
+        count["along the wall"] += _number(astray & (angle < 180.0 - FITS))
         # A circle has 2 pi radians, to two decimals
         small = azimuth <= 2.0 * np.pi + 0.01
         count["all"] += _number(azimuth > 0.0)
         count["small"] += _number(small & (azimuth > 0.0))
-        count["decimals"] += _number(small & (azimuth != np.floor(azimuth)))
+        count["decimals"] += _number(azimuth % 1.0 > 0.0)
         # Other forms of the azimuths that do not fit
         if astray.any():
             east = np.where(astray, 90.0 - azimuth, np.nan)
@@ -652,19 +650,18 @@ class _FileAccount:
         """Return why heights may be in feet, with the subject; empty if they may not."""
         count, period = self._count["height"], self._count["period"]
         if 2 * count["high storeys"] > count["storeys"]:
-            of = f"{count['high storeys']} of {count['storeys']} with two storeys or more"
-            return "heights", f"{of} make floors above {HIGH_STOREY:g} m"
+            of = f"{count['high storeys']} of {count['storeys']} make"
+            return "heights", f"{of} floors above {HIGH_STOREY:g} m"
         # Neither storeys nor periods tell it: hardly any is low, most are high and slender
         alone, low, high = count["alone"], count["low"], count["high"]
-        is_slender = 2 * count["slender"] > count["apart"] or not count["apart"]
-        if is_slender and alone > FEWEST and 50 * low <= alone < 2 * high:
-            of = f"{low} of {alone} without storeys are below {LOWEST_FEET:g} m"
-            return "heights", f"{of} and {high} above {HIGH_FEET:g} m"
+        is_high = 50 * low <= alone < 2 * high and 2 * count["slender"] >= count["apart"]
+        if is_high and alone > FEWEST:
+            few = f"{low} of {alone} without storeys are below {LOWEST_FEET:g} m"
+            return "heights", f"{few}, {high} above {HIGH_FEET:g} m"
         # Periods of lower buildings
-        short, every = period["short"], period["all"]
-        if 3 < every < 2 * short:
-            fit = f"are below {SHORT_PERIOD:g} of what the heights suggest"
-            return "periods", f"{short} of {every} {fit}"
+        if 3 < period["all"] < 2 * period["short"]:
+            few = f"{period['short']} of {period['all']} are below {SHORT_PERIOD:g}"
+            return "periods", f"{few} of what the heights suggest"
         return "", ""
 
     def _is_light(self) -> bool:
@@ -680,6 +677,7 @@ class _FileAccount:
             if 4 * astray < compared:
                 return ""
             forms = ("in radians", "backwards", "from east", "along the wall")
+            count["backwards"] = astray - count["along the wall"]
             best = max(forms, key=lambda form: count[form])
             return best if 10 * count[best] >= 9 * astray else "any way"
         is_small = every >= FEWEST and count["small"] == every and count["decimals"]
