@@ -654,14 +654,17 @@ class _FileAccount:
             return "heights", f"{of} floors above {HIGH_STOREY:g} m"
         # Neither storeys nor periods tell it: hardly any is low, most are high and slender
         alone, low, high = count["alone"], count["low"], count["high"]
-        is_high = 50 * low <= alone < 2 * high and 2 * count["slender"] >= count["apart"]
-        if is_high and alone > FEWEST:
-            few = f"{low} of {alone} without storeys are below {LOWEST_FEET:g} m"
-            return "heights", f"{few}, {high} above {HIGH_FEET:g} m"
+        if (
+            2 * count["slender"] >= count["apart"]
+            and alone > FEWEST
+            and 50 * low <= alone < 2 * high
+        ):
+            of = f"{low} of {alone} without storeys below {LOWEST_FEET:g} m"
+            return "heights", f"{of}, {high} above {HIGH_FEET:g} m"
         # Periods of lower buildings
         if 3 < period["all"] < 2 * period["short"]:
-            few = f"{period['short']} of {period['all']} are below {SHORT_PERIOD:g}"
-            return "periods", f"{few} of what the heights suggest"
+            short = f"{period['short']} of {period['all']}"
+            return "periods", f"{short} are far below what the heights suggest"
         return "", ""
 
     def _is_light(self) -> bool:

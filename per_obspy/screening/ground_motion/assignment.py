@@ -124,30 +124,34 @@ def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tupl
     return tuple(rejections)
 
 
+#: Usual mistakes in positions: what was meant, and the factors of longitude and latitude; exchanged
+#: ones have none.
+_MISTAKES = {
+    "longitude = {0:g} and latitude = {1:g} exchanged": None,
+    "longitude = {0:g} of the other sign": (-1.0, 1.0),
+    "latitude = {1:g} of the other sign": (1.0, -1.0),
+    "longitude = {0:g} and latitude = {1:g} of the other signs": (-1.0, -1.0),
+}
+
+
 def _place_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
     """Return a hint per pair that would reach a station at another place, else empty."""
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
-    east_west, north_south = "longitude = {0:g}", "latitude = {1:g}"
-    ways = {
-        f"{east_west} and {north_south} exchanged": (latitude, longitude, "are they swapped?"),
-        f"{east_west} of the other sign": (-longitude, latitude, "has it lost its sign?"),
-        f"{north_south} of the other sign": (longitude, -latitude, "has it lost its sign?"),
-        f"{east_west} and {north_south} of the other signs": (
-            -longitude,
-            -latitude,
-            "have they lost their signs?",
-        ),
-    }
     hints = [""] * len(pairs)
-    for way, (east, north, question) in ways.items():
+    for mistake, signs in _MISTAKES.items():
+        east, north = (
+            (signs[0] * longitude, signs[1] * latitude) if signs else (latitude, longitude)
+        )
         # A longitude beyond 90 degrees cannot be a latitude
         possible = np.abs(north) <= 90.0
         place = east, np.where(possible, north, 0.0)
         index, distance = nearest_station(*place, stations.longitude, stations.latitude)
+        # The first mistake that explains it
+        question = "has a sign been lost?" if signs else "are they swapped?"
         for i in np.flatnonzero(possible & (distance <= reach)).tolist():
-            meant, name = way.format(longitude[i], latitude[i]), stations.names[index[i]]
-            hint = f"; with {meant}, {name} would be {distance[i]:.0f} m away: {question}"
-            hints[i] = hints[i] or hint
+            meant = mistake.format(longitude[i], latitude[i])
+            station = f"{stations.names[index[i]]} would be {distance[i]:.0f} m away"
+            hints[i] = hints[i] or f"; with {meant}, {station}: {question}"
     return hints
 
 
