@@ -147,7 +147,8 @@ def test_pairs_that_would_reach_a_station_with_another_sign_are_suspected():
     _, rejected = assigned(pairs, uyuni, 20e3)
     reasons = [rejection.reasons[0].partition("; ")[2] for rejection in rejected]
     assert reasons == [
-        "with longitude = 67.95 of the other sign, NEAR would be 1112 m away: has a sign been lost?",
+        "with longitude = 67.95 of the other sign, NEAR would be 1112 m away: "
+        "has a sign been lost?",
         "with latitude = 20.3 of the other sign, NEAR would be 1112 m away: has a sign been lost?",
         "with longitude = 67.95 and latitude = 20.3 of the other signs, NEAR would be 1112 m away: "
         "has a sign been lost?",
