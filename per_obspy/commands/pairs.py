@@ -188,11 +188,10 @@ def check_pairs(
 def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     """Print the description of a pair table, as JSON or as text."""
     from per_obspy.inventory.files.reading import recognised_line
-    from per_obspy.inventory.table_checks import suspicions
 
     # Counts, and findings about the table as a whole
     counts = {"pairs": len(table), "touching": int((table["gap"] == 0.0).sum())}
-    rejected, odd = table.attrs["rejected"], suspicions(table)
+    rejected, odd = table.attrs["rejected"], table.attrs["suspicions"]
     found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
     if as_json:
         known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
@@ -235,7 +234,7 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
 
 def _noted(table: "pd.DataFrame") -> "pd.DataFrame":
     """Return the pairs with a note on their cells, none if the table has no notes."""
-    notes = table.reindex(columns=["pair_id", "cell_notes"]).fillna("")
+    notes = table.reindex(columns=["pair_id", "cell_notes"]).astype(object).fillna("")
     return notes[notes["cell_notes"] != ""]
 
 

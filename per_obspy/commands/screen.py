@@ -27,6 +27,7 @@ from per_obspy.commands.operation.logged import (
 )
 from per_obspy.commands.printing import print_table, state_texts
 from per_obspy.commands.run import print_nothing, print_result
+from per_obspy.errors import printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,6 +139,8 @@ def _screened_by_spectrum(
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
+    for sentence in pairs.attrs["suspicions"]:
+        print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
     return table, files
 
 

@@ -217,7 +217,8 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
         allowed = f"{column.low:g}{unit} or more"
     faults = []
     for i in _rows((number < column.low) | (number > column.high)):
-        hint = f" ({column.hint})" if column.hint and abs(number[i]) > column.high else ""
+        hint = column.hint if abs(number[i]) > column.high else column.hint_below
+        hint = f" ({hint})" if hint else ""
         faults.append((i, f"{column.name} = {number[i]:.9g}{unit} is outside {allowed}{hint}"))
     return faults
 
@@ -259,9 +260,27 @@ def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
 def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
     """Yield rows whose contact height is above the lower building."""
     contact = numbers_in(pairs, "contact_height")
-    lower = np.fmin(numbers_in(pairs, "height_1"), numbers_in(pairs, "height_2"))
+    # Of a building without height the highest that its storeys may make
+    roofs = []
+    for i in (1, 2):
+        height = numbers_in(pairs, f"height_{i}")
+        highest = STOREY_HEIGHTS[1] * numbers_in(pairs, f"storeys_{i}")
+        roofs.append(np.where(np.isnan(height), highest, height))
+    lower = np.fmin(*roofs)
     for i in _rows(contact > lower + CONTACT_TOLERANCE):
         yield i, f"contact_height = {contact[i]:g} m is above the lower building, {lower[i]:g} m"
+
+
+def _floor_offsets(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows whose nearest floor would be further away than a storey."""
+    offset = np.abs(numbers_in(pairs, "floor_offset"))
+    # Of the building with the higher storeys
+    with np.errstate(divide="ignore", invalid="ignore"):
+        storey = np.fmax(
+            *(numbers_in(pairs, f"height_{i}") / numbers_in(pairs, f"storeys_{i}") for i in (1, 2))
+        )
+    for i in _rows(offset > storey):
+        yield i, f"floor_offset = {offset[i]:g} m is larger than a storey, {storey[i]:.3g} m"
 
 
 def _placeholders(pairs: pd.DataFrame) -> Iterator[Fault]:
@@ -276,18 +295,44 @@ def _placeholders(pairs: pd.DataFrame) -> Iterator[Fault]:
 def _separations(pairs: pd.DataFrame) -> Iterator[Fault]:
     """Yield rows whose buildings lie too far from each other for neighbours."""
     names = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
-    longitude_1, latitude_1, longitude_2, latitude_2 = (numbers_in(pairs, name) for name in names)
-    # Distance on a sphere taken as flat, across the date line too
-    north = latitude_2 - latitude_1
-    east = (longitude_2 - longitude_1 + 180.0) % 360.0 - 180.0
-    distance = METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1)))
+    # Far from each other, whatever the reason
+    corners = [numbers_in(pairs, name) for name in names]
+    distance = _distance(*corners)
     # Positions outside the range of the schema are a separate fault
     in_range = [np.abs(numbers_in(pairs, name)) <= COLUMNS[name].high for name in names]
     is_far = np.all(in_range, axis=0) & (distance > LARGEST_SEPARATION)
     for i in _rows(is_far):
-        first = f"(longitude_1 = {longitude_1[i]:g}, latitude_1 = {latitude_1[i]:g})"
-        second = f"(longitude_2 = {longitude_2[i]:g}, latitude_2 = {latitude_2[i]:g})"
-        yield i, f"the positions {first} and {second} are {distance[i] / 1000:.3g} km apart"
+        longitude_1, latitude_1, longitude_2, latitude_2 = (float(values[i]) for values in corners)
+        first = f"(longitude_1 = {longitude_1:g}, latitude_1 = {latitude_1:g})"
+        second = f"(longitude_2 = {longitude_2:g}, latitude_2 = {latitude_2:g})"
+        apart = f"the positions {first} and {second} are {distance[i] / 1000:.3g} km apart"
+        yield i, apart + _usual_mistake(longitude_1, latitude_1, longitude_2, latitude_2)
+
+
+def _usual_mistake(
+    longitude_1: float, latitude_1: float, longitude_2: float, latitude_2: float
+) -> str:
+    """Return the mistake without which two positions would be neighbours, empty if none is."""
+    other_ways = {
+        "a longitude without its sign": (-longitude_2, latitude_2),
+        "a latitude without its sign": (longitude_2, -latitude_2),
+        "both without their sign": (-longitude_2, -latitude_2),
+        "longitude and latitude exchanged in one of them": (latitude_2, longitude_2),
+    }
+    # Positions of the second building as they may be meant
+    for way, meant in other_ways.items():
+        if _distance(longitude_1, latitude_1, *meant) <= LARGEST_SEPARATION:
+            return f": {way}?"
+    return ""
+
+
+def _distance(
+    longitude_1: ArrayLike, latitude_1: ArrayLike, longitude_2: ArrayLike, latitude_2: ArrayLike
+) -> FloatArray:
+    """Return the distance, m, on a sphere taken as flat, across the date line too."""
+    north = np.subtract(latitude_2, latitude_1)
+    east = (np.subtract(longitude_2, longitude_1) + 180.0) % 360.0 - 180.0
+    return np.asarray(METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1))))
 
 
 def _same_building(pairs: pd.DataFrame) -> Iterator[Fault]:
@@ -313,6 +358,7 @@ _CHECKS = (
     _sizes,
     _storey_heights,
     _contact_heights,
+    _floor_offsets,
     _placeholders,
     _separations,
     _same_building,

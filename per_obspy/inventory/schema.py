@@ -55,7 +55,9 @@ class Column(NamedTuple):
     choices : tuple of str
         The texts allowed; empty if any text is.
     hint : str
-        Usual mistake behind a value out of range.
+        Usual mistake behind a value above the range.
+    hint_below : str
+        Usual mistake behind a value below the range.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Column(NamedTuple):
     choices: tuple[str, ...] = ()
     hint: str = ""
     may_be_empty: bool = False
+    hint_below: str = ""
 
 
 #: Smallest quantity that counts as above zero: a tenth of a millimetre, a tenth of a millisecond.
@@ -82,7 +85,7 @@ _PAIR = (
            required=True, may_be_empty=True, low=0.0, high=10.0,
            hint="given in millimetres or centimetres by mistake?"),
     Column("gap_std", "float64", "m", "standard deviation of the measured gap",
-           low=0.0, high=1.0, hint="in millimetres?"),
+           low=0.0, high=1.0, hint="in centimetres or millimetres?"),
     Column("gap_std_source", "str", "", "whether gap_std is given or assumed",
            choices=DEVIATION_SOURCES),
     Column("azimuth", "float64", "degrees",
@@ -91,7 +94,7 @@ _PAIR = (
            low=TINY, high=1000.0),
     Column("floor_offset", "float64", "m",
            "height between a floor of one building and the nearest floor of the other",
-           low=-20.0, high=20.0),
+           low=-12.0, high=12.0, hint="in centimetres?", hint_below="in centimetres?"),
     Column("facing_length", "float64", "m", "length over which the walls face each other",
            low=0.0, high=1000.0),
     Column("position", "str", "", "whether the pair is at the end of its row of buildings",
@@ -100,9 +103,9 @@ _PAIR = (
            "whether both buildings are within one property; code rules take the larger gap where "
            "it is empty", choices=ONE_PROPERTY),
     Column("restitution", "float64", "1", "coefficient of restitution of impact",
-           low=0.0, high=1.0),
+           low=0.0, high=1.0, hint="a fraction is expected, not per cent"),
     Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground",
-           low=30.0, high=4000.0),
+           low=30.0, high=4000.0, hint="in cm/s?", hint_below="in km/s?"),
     Column("site_class", "str", "",
            "site class of the ground, compared with that of the station"),
     Column("observed", "float64", "1",
@@ -143,14 +146,14 @@ _BUILDING = (
     Column("area", "float64", "m2", "floor area of one storey", low=1.0, high=1e6),
     Column("participation", "float64", "1",
            "displacement at contact height / displacement of the oscillator",
-           low=TINY, high=3.0),
+           low=TINY, high=3.0, hint="a ratio is expected, not per cent"),
     Column("yield_displacement", "float64", "m",
            "yield displacement of the equivalent oscillator; infinite if it stays "
            "linear", low=TINY),
     Column("yield_coefficient", "float64", "1",
            "base shear at yield / total weight of the building; the oscillator yields at that over "
            "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",
-           low=TINY, high=10.0),
+           low=TINY, high=3.0, hint="a fraction is expected, not per cent"),
     Column("hardening", "float64", "1", "stiffness after yield / stiffness before",
            low=0.0, high=1.0 - 1e-9),
     Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),

@@ -1,20 +1,15 @@
-"""
-Checks of a pair table as a whole: ranges of its columns, derived and unused columns, odd units.
-
-They find rows that are possible one by one but unusual for the table, and change no row.
-"""
+"""Description of a pair table as a whole: ranges of its columns, derived and unused columns."""
 
 from collections import Counter
 from collections.abc import Iterable
 
 import pandas as pd
-import pyarrow as pa
 
 from per_obspy.config import Building
 from per_obspy.errors import Rejection, did_you_mean
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.inventory.gap_units import GAP, gap_counts, gap_suspicions
 from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.suspicions import ODD
 
 
 def inventory_profile(pairs: pd.DataFrame) -> pd.DataFrame:
@@ -64,7 +59,9 @@ def derived_counts(pairs: pd.DataFrame) -> dict[str, int]:
 
 def unused_columns(pairs: pd.DataFrame) -> list[str]:
     """Return the columns unknown to the schema, each with a similar name of a known one."""
-    return [f"{name}{did_you_mean(str(name), COLUMNS)}" for name in pairs if name not in COLUMNS]
+    return [
+        f"{name}{did_you_mean(str(name), COLUMNS)}" for name in pairs if name not in {*COLUMNS, ODD}
+    ]
 
 
 def faults_by_column(rejected: Iterable[Rejection]) -> dict[str, int]:
@@ -76,9 +73,3 @@ def faults_by_column(rejected: Iterable[Rejection]) -> dict[str, int]:
     reasons = (reason for rejection in rejected for reason in rejection.reasons)
     columns = (reason.partition(" = ")[0] for reason in reasons)
     return dict(Counter(columns).most_common())
-
-
-def suspicions(pairs: pd.DataFrame) -> list[str]:
-    """Return warnings about values that are possible row by row but odd for the whole table."""
-    gaps = pairs.attrs.get("gaps") or gap_counts(pa.chunked_array([pairs[GAP].to_numpy()]))
-    return gap_suspicions(gaps)

@@ -179,13 +179,14 @@ def _key(job: ChunkJob) -> str:
     settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
     parts = [version("per_obspy"), rows.source, *settings, job.ground.key]
     digest.update("\n".join(parts).encode())
-    # Raw rows: broken lines, cells, places in their file, and names that came before
+    # Raw rows: broken lines, cells, places in their file, what came before, and what is odd
     digest.update(repr(rows.broken).encode())
     content = pa.BufferOutputStream()
     with pa.ipc.new_stream(content, rows.table.schema) as stream:
         stream.write_table(rows.table.combine_chunks())
     digest.update(content.getvalue())
     digest.update(rows.lines.tobytes() + job.chunk.repeated.tobytes())
+    digest.update("\n".join(job.chunk.odd).encode())
     return digest.hexdigest()
 
 

@@ -15,7 +15,6 @@ from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairInventory
-from per_obspy.inventory.gap_units import gap_suspicions
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
@@ -49,7 +48,7 @@ class PairNotes(NamedTuple):
     recognised : tuple of str
         How each table that is not plain is read.
     suspicions : tuple of str
-        Sentences on gaps that are possible one by one but implausible together.
+        Sentences on what is possible but odd: rows, columns, pairs and buildings given twice.
     """
 
     recognised: tuple[str, ...] = ()
@@ -73,7 +72,7 @@ class Screened(NamedTuple):
     failed : bool
         Whether the work of a chunk failed unexpectedly.
     pair_tables : PairNotes
-        Sentences on the recognised form of the pair tables, and on implausible gaps.
+        Sentences on the recognised form of the pair tables, and on what is odd in them.
     """
 
     outputs: list[Path]
@@ -210,7 +209,7 @@ def _parts(
         progress("screening", min(rows, inventory.count), inventory.count)
     _remove_others(_chunk_folder(folder), parts)
     # Findings about the tables, after all their rows were read
-    notes = PairNotes(tuple(inventory.recognised()), tuple(gap_suspicions(inventory.gaps)))
+    notes = PairNotes(tuple(inventory.recognised()), tuple(inventory.suspicions.sentences()))
     return sorted(parts, key=lambda part: part.number), notes
 
 

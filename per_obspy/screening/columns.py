@@ -6,6 +6,7 @@ from functools import cache
 import pandas as pd
 
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.inventory.suspicions import ROW_SUSPICIONS
 from per_obspy.screening.codes import rule_columns
 
 
@@ -361,6 +362,7 @@ FLAGS: dict[str, str] = {
         "the station's record failed another check that only warns: see stations.csv"
     ),
     "simulated": "the ground motion is simulated",
+    **ROW_SUSPICIONS,
 }
 
 

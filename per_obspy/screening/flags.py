@@ -1,12 +1,13 @@
 """Flags of the rows of the risk table: warnings and assumptions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.config import Screening
+from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.columns import FLAGS, RECORD_FLAGS
 from per_obspy.screening.values import Table, both, number, values
@@ -41,7 +42,9 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
     has_note = np.array(
         [isinstance(note, str) and note != "" for note in np.asarray(notes).tolist()], bool
     )
+    odd = _named_in(table[ODD]) if ODD in table else {}
     return {
+        **odd,
         "unknown_gap": np.asarray(unknown, dtype=bool),
         "doubtful_cell": has_note,
         "touching": gap == 0.0,
@@ -51,6 +54,17 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
         "no_demand": values(table, "demand") == 0.0,
         "floor_to_column": np.asarray(table["floors_misaligned"], dtype=bool),
     }
+
+
+def _named_in(odd: Iterable[str]) -> dict[str, NDArray[np.bool_]]:
+    """Return a mask of rows per suspicion of the pair table."""
+    # Most rows have none
+    texts = np.asarray(odd, dtype=object)
+    masks = {name: np.zeros(texts.size, dtype=bool) for name in ROW_SUSPICIONS}
+    for text in set(texts.tolist()) - {""}:
+        for name in text.split():
+            masks[name] |= texts == text
+    return masks
 
 
 def raised_by_record(

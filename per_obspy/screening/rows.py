@@ -15,6 +15,7 @@ from pandas.api.types import is_numeric_dtype
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.suspicions import ODD
 from per_obspy.screening.by_record.demand import demand_ratio
 from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
@@ -189,7 +190,8 @@ def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.Data
     raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}
     flags = joined_flags(raised_by_pairs(table) | raised)
     rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
-    return table.drop(columns=[*INTERMEDIATE, *by_record.values()]).assign(flags=flags).join(rules)
+    dropped = [*INTERMEDIATE, *by_record.values(), *(name for name in table if name == ODD)]
+    return table.drop(columns=dropped).assign(flags=flags).join(rules)
 
 
 def _ordered(table: pd.DataFrame) -> pd.DataFrame:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.inventory.suspicions import ODD
 from per_obspy.screening.by_spectrum.design_table import DESIGN
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
@@ -26,7 +27,8 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
         Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
-    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
+    odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
+    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns() | {ODD: odd}
     write_csv(rounded_table(table, own=known), text)
     write_parquet(table, whole)
     # Columns of the pair table that are not computed here are carried through

@@ -62,7 +62,8 @@ FRACTION = "(a fraction is expected, not per cent)"
         ({"height_1": 999.0, "storeys_1": "3+1"},
          "none of height_1, storeys_1, period_1 is a number, one is needed: storeys_1 = '3+1' is "
          "not a number; height_1 = 999 is a placeholder, not a size"),
-        ({"restitution": 1.2}, "restitution = 1.2 is outside 0 to 1"),
+        ({"restitution": 1.2},
+          "restitution = 1.2 is outside 0 to 1 (a fraction is expected, not per cent)"),
         ({"hardening_1": 1.0}, "hardening_1 = 1 is outside 0 to 1"),
         ({"contact_height": 9.5}, "contact_height = 9.5 m is above the lower building, 9 m"),
         ({"azimuth": -10.0}, "azimuth = -10 degrees is outside 0 to 360 degrees"),

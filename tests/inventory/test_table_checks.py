@@ -1,4 +1,4 @@
-"""Checks of a pair table as a whole: its profile, derived and unused columns, odd units."""
+"""Checks of a pair table as a whole: its profile, derived and unused columns."""
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,6 @@ from per_obspy.inventory.table_checks import (
     derived_counts,
     faults_by_column,
     inventory_profile,
-    suspicions,
     unused_columns,
 )
 
@@ -57,19 +56,6 @@ def test_a_mistyped_column_is_asked_about():
         "perod_1, did you mean period_1?",
         "ward",
     ]
-
-
-def test_gaps_in_another_unit_are_suspected_as_a_whole():
-    # 3 to 8 mm are gaps in metres that each row may have, and that hardly any town has
-    assert suspicions(_pairs(gap=[0.0, 0.3])) == []
-    assert suspicions(_pairs(gap=[0.0, 0.0])) == []
-    (warning,) = suspicions(_pairs(gap=[0.0, 8.0]))
-    assert warning.startswith("1 of 1 gaps above 0 are wider than 3 m")
-    # whole centimetres of a survey, of which each could be metres
-    whole = [1.0, 2.0, 2.0, 3.0, 1.0, 0.0]
-    (warning,) = suspicions(_pairs(pair_id=list("abcdef"), gap=whole))
-    assert warning.startswith("all 5 gaps above 0 are whole metres")
-    assert suspicions(_pairs(pair_id=list("abcde"), gap=[1.0, 2.0, 2.0, 3.0, 1.5])) == []
 
 
 def test_faults_are_counted_by_column():

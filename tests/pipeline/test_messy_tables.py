@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import pandas as pd
 import pytest
-from messy_tables import NAMES, Messy, plain, readable, refused, suspected
+from messy_tables import NAMES, ROWS, Messy, plain, readable, refused, suspected, text_of
 from pandas.testing import assert_frame_equal
 
 from per_obspy import cli, read_pairs
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.suspicions import ROW_SUSPICIONS
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
 from .small_run import SPECTRA, plain_reports
@@ -138,6 +139,31 @@ def test_the_record_of_a_run_has_what_the_console_says(tried):
     notes = json.loads(Path("out/run.json").read_text())["pair_tables"]
     assert notes["recognised"] == []
     assert "centimetres" in notes["suspicions"][0]
+
+
+def test_odd_rows_have_the_same_sentences_in_every_command_and_flags_in_the_table(tried):
+    # would catch a path with rules of its own, and flags that a chunk loses
+    again = ("d", 0.07, *ROWS[0][5:8], *ROWS[0][2:5], "", "")
+    one_place = ("e", 0.3, 0.3006, 0.1001, 9.0, 0.3006, 0.1001, 12.0, "", "")
+    wide = ("f", 4.0, 0.3008, 0.1001, 9.0, 0.3009, 0.1001, 12.0, "", "")
+    light = ("g", 0.1, 0.3062, -0.1062, 9.0, 0.3063, -0.1062, 12.0, 900.0, "")
+    table = text_of(NAMES, [*ROWS, again, one_place, wide, light]).encode()
+    checked, ran, _ = tried(Messy("pairs.csv", table))
+    assert (checked.code, ran.code) == (0, 0)
+    notes = json.loads(Path("out/run.json").read_text())["pair_tables"]["suspicions"]
+    assert len(notes) == 4
+    assert read_pairs("pairs.csv").attrs["suspicions"] == notes
+    for sentence in notes:
+        assert f"Suspicious: {sentence}\n" in checked.out
+        assert f"per-obspy: {sentence}\n" in ran.err
+    # one flag for each odd row, and none for the others
+    flags = pd.read_parquet("out/risk.parquet").set_index("pair_id")["flags"].str.split()
+    odd = flags.map(lambda names: [name for name in names if name in ROW_SUSPICIONS]).to_dict()
+    assert {name: odd[name] for name in "abc"} == {"a": [], "b": [], "c": []}
+    assert (odd["d"], odd["e"], odd["f"]) == (["repeated_pair"], ["odd_positions"], ["odd_gap"])
+    assert odd["g"] == ["odd_building"]
+    meanings = pd.read_csv("out/risk.columns.csv").set_index("name")["meaning"]
+    assert meanings["flag_repeated_pair"] == ROW_SUSPICIONS["repeated_pair"]
 
 
 #: What the user writes into ``[pairs]`` -> kind of the refused table that it mends.

@@ -28,7 +28,6 @@ from per_obspy.inventory.files.csv_lines import (
 )
 from per_obspy.inventory.files.raw_rows import RawRows, cell_form, with_values
 from per_obspy.inventory.files.text_cells import given_text, given_texts
-from per_obspy.inventory.gap_units import GAP
 from per_obspy.inventory.recognition.column_meanings import IDENTIFIER
 from per_obspy.inventory.recognition.decimal_marks import (
     evidence_of,
@@ -191,8 +190,8 @@ class CsvFile:
     @cached_property
     def _cell_form(self) -> CellForm:
         """Return how the cells are written; reads the gaps of the whole file."""
-        blocks = self._blocks([GAP]) if GAP in self.names else ()
-        form = cell_form(self.meanings, (rows.table[GAP] for rows in blocks), self._marks)
+        blocks = self._blocks(["gap"]) if "gap" in self.names else ()
+        form = cell_form(self.meanings, (rows.table["gap"] for rows in blocks), self._marks)
         return form._replace(language=form.language or self._language)
 
     def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:

@@ -17,7 +17,6 @@ from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.files.raw_rows import PairFile, RawRows, cell_form, with_values
 from per_obspy.inventory.files.workbook_rows import WorkbookFile
-from per_obspy.inventory.gap_units import GAP
 from per_obspy.inventory.recognition.column_meanings import IDENTIFIER, meanings_of
 from per_obspy.inventory.recognition.side_file import form_of
 
@@ -91,7 +90,7 @@ class ParquetFile:
 
     def _gaps(self) -> Iterator[pa.ChunkedArray]:
         """Yield the gaps block by block."""
-        place = self.names.index(GAP)
+        place = self.names.index("gap")
         with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
             for batch in stored.iter_batches(columns=[self.headings[place]]):
                 yield plain_columns(pa.Table.from_batches([batch]))[0].column(0)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
 from per_obspy.inventory.cells import NOTES, CellForm, read_columns, unit_in_cells
-from per_obspy.inventory.gap_units import GAP
 from per_obspy.inventory.recognition.column_meanings import Meanings
 from per_obspy.inventory.schema import COLUMNS
 
@@ -116,7 +115,7 @@ def cell_form(
     units = {means.column: means.unit for means in meanings.columns.values() if means.unit}
     units |= meanings.units
     gap_unit = ""
-    for cells in () if GAP in units else gaps:
+    for cells in () if "gap" in units else gaps:
         if gap_unit or not pa.types.is_string(cells.type):
             continue
         has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")

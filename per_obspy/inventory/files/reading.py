@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection, printable
+from per_obspy.inventory.cells import read_columns
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs, row_names
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.raw_rows import PairFile, RawRows, name_hashes
-from per_obspy.inventory.gap_units import GAP, GapCounts, gap_counts, gap_suspicions
 from per_obspy.inventory.recognition.column_meanings import IDENTIFIER
-from per_obspy.inventory.recognition.proposals import proposed_units
 from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.suspicions import ODD, Suspicions
 
 #: More rows than any table has.
 ALL = 1 << 40
@@ -34,10 +34,13 @@ class PairChunk(NamedTuple):
         Before any check.
     repeated : (n_rows,) ndarray of bool
         Whether an earlier row of the inventory has the row's ``pair_id``.
+    odd : (n_rows,) ndarray of object
+        Names of each row's suspicions, see :mod:`per_obspy.inventory.suspicions`.
     """
 
     rows: RawRows
     repeated: NDArray[np.bool_]
+    odd: NDArray[np.object_]
 
 
 def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -> pd.DataFrame:
@@ -61,7 +64,10 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
         Accepted rows in file order: numbers as float64 in SI (NaN where empty), text as str (""
         where empty). ``pairs.attrs["rejected"]`` is a tuple of
         :class:`~per_obspy.errors.Rejection`, one for each other row, with every reason;
-        ``pairs.attrs["recognised"]`` lists recognised peculiarities of the file, empty without any.
+        ``pairs.attrs["recognised"]`` lists recognised peculiarities of the file, empty without any;
+        ``pairs.attrs["suspicions"]`` has a sentence for each thing that is possible but odd, and
+        the column ``odd_values``, which only tables with odd rows have, the names of each row's
+        suspicions.
 
     Raises
     ------
@@ -80,12 +86,8 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
         raise TypeError(f"path must be a path or a DataFrame, got {type(path).__name__}")
     file = checked_file(Path(path), form)
     rows = _all_rows(file, str(path))
-    pairs = _checked(rows, None)
-    # How the file is read, and in which units it may be
-    gaps = gap_counts(rows.table[GAP])
-    known = rows.table.select([name for name in file.names if name in COLUMNS]).to_pandas()
-    units = proposed_units(known, bool(gap_suspicions(gaps)))
-    pairs.attrs |= {"recognised": file.recognised, "gaps": gaps, "proposed_units": units}
+    pairs = _checked_whole(rows)
+    pairs.attrs["recognised"] = file.recognised
     return pairs
 
 
@@ -128,7 +130,42 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     if table.empty:
         raise CatalogError("table", "the table has no rows")
     check_columns([str(name) for name in table], "table")
-    return checked_pairs(table.reset_index(drop=True), "table")
+    table = table.reset_index(drop=True)
+    # As if it followed a header
+    lines = np.arange(2, len(table) + 2)
+    known = {name: table[name] for name in table if name in COLUMNS}
+    numbers = {name: cells for name, cells in known.items() if COLUMNS[name].dtype != "str"}
+    texts = {name: cells.astype(str).mask(cells.isna()) for name, cells in known.items()}
+    cells = pd.DataFrame(texts | read_columns(numbers) | {IDENTIFIER: row_names(table, lines)})
+    raw = RawRows("table", pa.Table.from_pandas(cells, preserve_index=False), lines, ())
+    account, odd = _account(raw)
+    return _with_account(checked_pairs(_with_odd(table, odd), "table"), account)
+
+
+def _account(rows: RawRows) -> tuple[Suspicions, NDArray[np.object_]]:
+    """Return the account of what is odd in a whole table, and the names in each row."""
+    account = Suspicions()
+    repeated = pd.Series(name_hashes(_identifiers(rows.table))).duplicated().to_numpy()
+    return account, account.add(rows.source, rows.table, rows.lines, repeated)
+
+
+def _with_account(pairs: pd.DataFrame, account: Suspicions) -> pd.DataFrame:
+    """Return pairs with the sentences on what is odd, and units that would explain it."""
+    pairs.attrs |= {"suspicions": account.sentences(), "proposed_units": account.units()}
+    return pairs
+
+
+def _with_odd(table: pd.DataFrame, odd: NDArray[np.object_]) -> pd.DataFrame:
+    """Return a table with the names of each row's suspicions, if there are any."""
+    table = table.drop(columns=ODD, errors="ignore")
+    return table.assign(**{ODD: odd}) if any(odd) else table
+
+
+def _checked_whole(rows: RawRows) -> pd.DataFrame:
+    """Check all rows of a file, with suspicions and proposed units."""
+    rows = _named(rows, "")
+    account, odd = _account(rows)
+    return _with_account(_checked(rows, None, odd), account)
 
 
 class PairInventory:
@@ -139,7 +176,7 @@ class PairInventory:
     ----------
     paths : sequence of Path
         As :func:`read_pairs`. Besides a chunk, memory holds 8 bytes per row to find repeated
-        identifiers.
+        identifiers, 16 per pair and, where buildings have identifiers, 16 per building.
     form : TableForm, optional
         Form of the files.
 
@@ -149,7 +186,7 @@ class PairInventory:
         Number of rows.
     names : set of str
         Columns that all files have.
-    gaps : GapCounts
+    suspicions : Suspicions
         Of the chunks that were read.
 
     Raises
@@ -160,7 +197,7 @@ class PairInventory:
 
     def __init__(self, paths: Sequence[Path], form: TableForm | None = None) -> None:
         self._files = {path: checked_file(path, form) for path in paths}
-        self.gaps = GapCounts()
+        self.suspicions = Suspicions()
         self.names = set.intersection(*(set(file.names) for file in self._files.values()))
         # Hashes that occur twice: candidates for repeated identifiers
         hashes = self._identifier_hashes()
@@ -182,15 +219,16 @@ class PairInventory:
     def chunks(self, size: int) -> Iterator[PairChunk]:
         """Yield chunks of so many rows; no chunk has rows of two files."""
         seen: set[str] = set()
-        self.gaps = GapCounts()
+        self.suspicions = Suspicions()
         stems = [path.stem for path in self._files]
         for path, file in self._files.items():
             # Rows without a name of several files are named by both
             prefix = path.stem if stems.count(path.stem) == 1 else str(path)
             for rows in file.rows(size):
-                self.gaps = self.gaps.joined(gap_counts(rows.table[GAP]))
                 named = _named(rows, f"{prefix} " if len(stems) > 1 else "")
-                yield PairChunk(named, _repeated(named.table[IDENTIFIER], self._repeated, seen))
+                repeated = _repeated(named.table, self._repeated, seen)
+                odd = self.suspicions.add(named.source, named.table, named.lines, repeated)
+                yield PairChunk(named, repeated, odd)
 
     def recognised(self) -> list[str]:
         """Return a sentence for each file that is not plain: how it is read."""
@@ -215,35 +253,41 @@ def recognised_line(path: Path, recognised: str) -> str:
     return printable(f"{path.name}: read as {recognised}")
 
 
-def _repeated(
-    identifiers: pa.ChunkedArray, hashes: NDArray[np.uint64], seen: set[str]
-) -> NDArray[np.bool_]:
+def _identifiers(table: pa.Table) -> pa.Array:
+    """Return the identifiers of pairs without the blanks around them."""
+    filled = pc.fill_null(table[IDENTIFIER].cast(pa.string()), "")
+    return pc.utf8_trim_whitespace(filled).combine_chunks()
+
+
+def _repeated(table: pa.Table, hashes: NDArray[np.uint64], seen: set[str]) -> NDArray[np.bool_]:
     """
     Return the rows whose identifier occurred before.
 
     Only identifiers whose hash is repeated are added to those seen.
     """
-    filled = pc.fill_null(identifiers.cast(pa.string()), "")
-    text = pc.utf8_trim_whitespace(filled).combine_chunks()
+    text = _identifiers(table)
     # A hash may be shared by chance: the identifiers themselves decide
     repeated = np.isin(name_hashes(text), hashes)
     for row in np.flatnonzero(repeated).tolist():
         name = text[row].as_py()
-        repeated[row] = name in seen
+        # Rows without a name are named by their number
+        repeated[row] = name in seen and name != ""
         seen.add(name)
     return repeated
 
 
 def checked_chunk(chunk: PairChunk) -> pd.DataFrame:
     """Return the accepted rows of a chunk in the form of :func:`read_pairs`."""
-    return _checked(chunk.rows, chunk.repeated)
+    return _checked(chunk.rows, chunk.repeated, chunk.odd)
 
 
-def _checked(rows: RawRows, repeated: NDArray[np.bool_] | None) -> pd.DataFrame:
+def _checked(
+    rows: RawRows, repeated: NDArray[np.bool_] | None, odd: NDArray[np.object_]
+) -> pd.DataFrame:
     """Check raw rows and add the broken lines to the rejected rows, in the order of the file."""
     # Metadata that pandas stored in the file could turn a column into the index
     table: pd.DataFrame = rows.table.replace_schema_metadata(None).to_pandas()
-    pairs = checked_pairs(table, rows.source, rows.lines, repeated)
+    pairs = checked_pairs(_with_odd(table, odd), rows.source, rows.lines, repeated)
     rejected: list[Rejection] = [*pairs.attrs["rejected"], *rows.broken]
     rejected.sort(key=lambda rejection: rejection.row or 0)
     pairs.attrs["rejected"] = Rejections(rejected)

@@ -10,7 +10,7 @@ import pandas as pd
 from per_obspy.errors import require_extra
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.inventory.schema import COLUMNS
-from per_obspy.inventory.table_checks import derived_counts, suspicions, unused_columns
+from per_obspy.inventory.table_checks import derived_counts, unused_columns
 from per_obspy.inventory.table_columns import numbers_in
 from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
 from per_obspy.pipeline.inputs.input_kinds import Kind
@@ -39,7 +39,8 @@ def pair_table_facts(path: Path) -> Facts:
     # Ranges, then derived, unknown and suspicious columns
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
-    lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(table, derived, unused)]
+    odd = [("suspicious", sentence) for sentence in inventory.suspicions.sentences()]
+    lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(derived, unused), *odd]
     lines += _rejected_lines(rejected, "line", "row")
     # The same for machines
     counted = {"rows": inventory.count, "usable": len(table)}
@@ -79,16 +80,14 @@ def _range_lines(table: pd.DataFrame) -> list[tuple[str, str]]:
     return lines
 
 
-def _odd_lines(
-    table: pd.DataFrame, derived: Mapping[str, int], unused: Sequence[str]
-) -> list[tuple[str, str]]:
-    """Return lines on derived, unknown and suspicious columns of a pair table."""
+def _odd_lines(derived: Mapping[str, int], unused: Sequence[str]) -> list[tuple[str, str]]:
+    """Return lines on derived and unknown columns of a pair table."""
     lines = []
     if derived:
         lines.append(("derived", some([f"{name} ({rows})" for name, rows in derived.items()], 8)))
     if unused:
         lines.append(("unknown", f"{some(unused)}: carried along unchanged"))
-    return lines + [("suspicious", sentence) for sentence in suspicions(table)]
+    return lines
 
 
 def footprint_facts(path: Path) -> Facts:

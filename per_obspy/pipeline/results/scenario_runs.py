@@ -9,6 +9,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
+from per_obspy.inventory.suspicions import ROW_SUSPICIONS
 from per_obspy.pipeline.results.layer_sources import outlines_beside
 from per_obspy.pipeline.results.station_facts import HISTORIES, pair_histories, station_rows
 from per_obspy.pipeline.stations import stations_of_earlier_run
@@ -25,7 +26,7 @@ OF_BUILDINGS = (
 )  # fmt: skip
 
 #: Flags that do not depend on the motion.
-OF_PAIRS = ("derived_inputs", "derived_period", "floor_to_column", "touching")
+OF_PAIRS = ("derived_inputs", "derived_period", "floor_to_column", "touching", *ROW_SUSPICIONS)
 
 
 class ScenarioRun(NamedTuple):

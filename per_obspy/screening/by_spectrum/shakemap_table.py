@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from per_obspy.config import Screening
 from per_obspy.errors import Rejection
+from per_obspy.inventory.suspicions import ODD
 from per_obspy.screening.by_spectrum.demand import spectral_columns, spectral_demand
 from per_obspy.screening.by_spectrum.shakemap_motion import (
     MapMotion,
@@ -140,7 +141,9 @@ def _rows(
     missing = np.maximum(demand.demand - values(pairs, "gap"), 0.0)
     table = table.assign(flags=_flags(shakemap, table), missing_gap=missing)
     empty = {name: _empty(name) for name in ORDER if name not in table and name != "rank"}
-    return table.assign(**empty).drop(columns=["srss_gap_sd", "absolute_gap_sd"])
+    return table.assign(**empty).drop(
+        columns=["srss_gap_sd", "absolute_gap_sd", ODD], errors="ignore"
+    )
 
 
 def _flags(shakemap: xr.Dataset, table: pd.DataFrame) -> NDArray[np.object_]:

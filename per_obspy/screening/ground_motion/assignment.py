@@ -114,9 +114,9 @@ def _without_stations(pairs: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Rejectio
 
 def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[Rejection, ...]:
     """Return rejections of pairs whose station is too far away, with its name and distance."""
-    # Exchanged coordinates are the usual reason of a pair far from every station
+    # Exchanged coordinates and lost signs are the usual reasons of a pair far from every station
     rejections = []
-    hints = _swap_hints(pairs, stations, reach)
+    hints = _place_hints(pairs, stations, reach)
     rows = zip(pairs["pair_id"], pairs["station"], pairs["distance"], hints, strict=True)
     for name, station, metres, hint in rows:
         reason = f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m{hint}"
@@ -124,23 +124,34 @@ def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tupl
     return tuple(rejections)
 
 
-def _swap_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
-    """Return a hint per pair whose exchanged coordinates would reach a station, else empty."""
+#: Usual mistakes in positions: what was meant, and the factors of longitude and latitude; exchanged
+#: ones have none.
+_MISTAKES = {
+    "longitude = {0:g} and latitude = {1:g} exchanged": None,
+    "longitude = {0:g} of the other sign": (-1.0, 1.0),
+    "latitude = {1:g} of the other sign": (1.0, -1.0),
+    "longitude = {0:g} and latitude = {1:g} of the other signs": (-1.0, -1.0),
+}
+
+
+def _place_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
+    """Return a hint per pair that would reach a station at another place, else empty."""
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
-    # A longitude beyond 90 degrees cannot be a latitude
-    possible = np.abs(longitude) <= 90.0
-    index, distance = nearest_station(
-        latitude, np.where(possible, longitude, 0.0), stations.longitude, stations.latitude
-    )
-    hints = []
-    swapped = possible & (distance <= reach)
-    rows = zip(longitude, latitude, index, distance, swapped, strict=True)
-    for east, north, station, metres, near in rows:
-        hint = (
-            f"; with longitude = {east:g} and latitude = {north:g} exchanged, "
-            f"{stations.names[station]} would be {metres:.0f} m away: are they swapped?"
+    hints = [""] * len(pairs)
+    for mistake, signs in _MISTAKES.items():
+        east, north = (
+            (signs[0] * longitude, signs[1] * latitude) if signs else (latitude, longitude)
         )
-        hints.append(hint if near else "")
+        # A longitude beyond 90 degrees cannot be a latitude
+        possible = np.abs(north) <= 90.0
+        place = east, np.where(possible, north, 0.0)
+        index, distance = nearest_station(*place, stations.longitude, stations.latitude)
+        # The first mistake that explains it
+        question = "has a sign been lost?" if signs else "are they swapped?"
+        for i in np.flatnonzero(possible & (distance <= reach)).tolist():
+            meant = mistake.format(longitude[i], latitude[i])
+            station = f"{stations.names[index[i]]} would be {distance[i]:.0f} m away"
+            hints[i] = hints[i] or f"; with {meant}, {station}: {question}"
     return hints
 
 

@@ -1,5 +1,7 @@
 """Files of pairs in chunks: the same rows, lines and reasons as in one piece."""
 
+from zlib import crc32
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +15,9 @@ HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,hei
 
 
 def _row(name, gap="0.05", note="shop", zone=3):
-    return f"{name},{gap},-67.95,-20.35,12,-67.9501,-20.35,9.5,{note},{zone}"
+    # Every name has a place of its own, as no pair is given twice
+    east = -60.0 - crc32(name.strip().encode()) % 90_000 / 1e4
+    return f"{name},{gap},{east:.4f},-20.35,12,{east - 1e-4:.4f},-20.35,9.5,{note},{zone}"
 
 
 ROWS = [

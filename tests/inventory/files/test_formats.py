@@ -43,7 +43,9 @@ def table():
     place = {"longitude_1": 0.3, "latitude_1": 0.1, "longitude_2": 0.3001, "latitude_2": 0.1}
     sizes = {"height_1": 9.0, "height_2": 12.0}
     names = pd.DataFrame({"pair_id": ["007", "008", "009"]})
-    return names.assign(gap=0.05, **place, **sizes)
+    return names.assign(gap=[0.05, 0.1, 0.2], **place, **sizes).assign(
+        latitude_2=[0.1, 0.1001, 0.1002]
+    )
 
 
 @pytest.mark.parametrize("damage", ["cut", "zeroed"])

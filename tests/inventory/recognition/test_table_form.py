@@ -2,7 +2,7 @@
 The form of text tables: encodings, and side files.
 
 Also of per_obspy.inventory.recognition.encodings, per_obspy.inventory.recognition.side_file,
-per_obspy.inventory.recognition.proposals, per_obspy.inventory.gap_units,
+per_obspy.inventory.suspicions,
 per_obspy.inventory.files.workbook_rows and per_obspy.config.pairs.
 """
 

@@ -131,3 +131,26 @@ def test_coordinates_that_would_reach_a_station_if_exchanged_are_suspected():
     assert swapped.endswith(f"beyond 20000 m; {hint}")
     assert far.endswith("beyond 20000 m")
     assert wide.endswith("beyond 20000 m")
+
+
+def test_pairs_that_would_reach_a_station_with_another_sign_are_suspected():
+    # a whole table without the sign of its longitudes is seen by its stations only
+    places = {"longitude": [67.95, -67.95, 67.95, 10.0], "latitude": [-20.3, 20.3, 20.3, 10.0]}
+    pairs = pd.DataFrame({"pair_id": list("abcd"), **places})
+    uyuni = Stations(
+        np.array(["NEAR"], dtype=object),
+        np.array([-67.95]),
+        np.array([-20.31]),
+        np.array([""], dtype=object),
+        lambda _: None,
+    )
+    _, rejected = assigned(pairs, uyuni, 20e3)
+    reasons = [rejection.reasons[0].partition("; ")[2] for rejection in rejected]
+    assert reasons == [
+        "with longitude = 67.95 of the other sign, NEAR would be 1112 m away: "
+        "has a sign been lost?",
+        "with latitude = 20.3 of the other sign, NEAR would be 1112 m away: has a sign been lost?",
+        "with longitude = 67.95 and latitude = 20.3 of the other signs, NEAR would be 1112 m away: "
+        "has a sign been lost?",
+        "",
+    ]

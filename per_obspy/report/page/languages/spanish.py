@@ -369,6 +369,27 @@ SPANISH: dict[str, str] = {
     ),
     "flag_record_warning": ("el registro falló otra revisión que solo advierte: vea stations.csv"),
     "flag_simulated": "el movimiento del suelo es simulado",
+    "flag_odd_gap": (
+        "la separación supera 3 m, la distancia entre las posiciones, o es menor que su desviación "
+        "estándar: vea pair_tables en run.json"
+    ),
+    "flag_odd_positions": (
+        "ambos edificios tienen una sola posición, o posiciones demasiado lejanas para vecinos"
+    ),
+    "flag_odd_azimuth": "el azimut es perpendicular u opuesto a la línea entre las posiciones",
+    "flag_odd_height": (
+        "altura, pisos, altura de contacto o desfase de losas posibles pero extraños, como en pies "
+        "o centímetros, o pisos con decimales"
+    ),
+    "flag_odd_period": "un período dista mucho del que sugiere la altura, como una frecuencia",
+    "flag_odd_building": (
+        "amortiguamiento, masa, resistencia o participación posibles pero extraños, como en por "
+        "ciento o toneladas"
+    ),
+    "flag_repeated_pair": "una fila anterior de la tabla tiene los mismos dos edificios",
+    "flag_contradicting_building": (
+        "una fila anterior da otros valores u otro lugar a un edificio del mismo building_id"
+    ),
     "flagname_unknown_gap": "separación desconocida",
     "flagname_doubtful_cell": "celda dudosa",
     "flagname_touching": "en contacto",
@@ -384,6 +405,14 @@ SPANISH: dict[str, str] = {
     "flagname_no_damping_suffices": "ningún amortiguamiento basta",
     "flagname_no_bumper_suffices": "ningún tope basta",
     "flagname_no_demand": "sin demanda",
+    "flagname_odd_gap": "separación extraña",
+    "flagname_odd_positions": "posiciones extrañas",
+    "flagname_odd_azimuth": "azimut extraño",
+    "flagname_odd_height": "altura extraña",
+    "flagname_odd_period": "período extraño",
+    "flagname_odd_building": "edificio extraño",
+    "flagname_repeated_pair": "par repetido",
+    "flagname_contradicting_building": "edificio contradictorio",
     "flagname_floor_to_column": "losa contra columna",
     "flagname_record_from_other_site_class": "registro de otra clase de sitio",
     "flagname_motion_from_other_site_class": "movimiento de otra clase de sitio",
