@@ -8,6 +8,10 @@ BIN := .venv/bin
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
 	$(BIN)/per-obspy run workflows/demo.toml
+	@echo "== open output/demo/report.html in a browser; the worst pair in words:"
+	@echo "     $(BIN)/per-obspy show '#1' output/demo"
+	@echo "== your own records and buildings (in a new shell first: source $(BIN)/activate, then per-obspy without its path):"
+	@echo "     $(BIN)/per-obspy run RECORDS PAIRS -o output/mine"
 
 figures: .venv/run
 	@echo "== redraw the paper's figures, on real records if PER_OBSPY_DATA or ../shared/data has them"

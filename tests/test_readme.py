@@ -1,6 +1,7 @@
 """The README's Python runs, and prints the documented output."""
 
 import re
+import subprocess
 from pathlib import Path
 
 CHECKOUT = Path(__file__).parents[1]
@@ -27,3 +28,24 @@ def test_every_picture_of_the_readme_is_there():
         r"!\[.*?\]\((.*?)\)", (CHECKOUT / "README.md").read_text(encoding="utf-8")
     ):
         assert (CHECKOUT / name).is_file(), name
+
+
+def test_the_demonstration_ends_with_a_command_that_is_there():
+    """Catch a next step that the shell does not find: only .venv has the command."""
+    asked = ["make", "--dry-run", "--old-file=.venv/run", "demo"]
+    lines = subprocess.run(asked, cwd=CHECKOUT, capture_output=True, text=True, check=True).stdout
+    last = lines.splitlines()[-1].removeprefix('echo "').strip(' "')
+    assert last.startswith(".venv/bin/per-obspy run RECORDS PAIRS")
+    assert "source .venv/bin/activate" in lines
+    assert "source .venv/bin/activate" in (CHECKOUT / "README.md").read_text(encoding="utf-8")
+
+
+def test_nobody_is_sent_to_an_index_that_has_no_release():
+    """`pip install per_obspy` without an extra finds nothing before a release."""
+    pages = [CHECKOUT / "README.md", *(CHECKOUT / "docs").rglob("*.md")]
+    pattern = re.compile(r"pip install '?per_obspy(?:\[[a-z,]+\])?'?(?P<rest>[^\n]*)")
+    found = [match for page in pages for match in pattern.finditer(page.read_text("utf-8"))]
+    # Said to find nothing, or to add libraries where the package is
+    known = ("` finds nothing", "` adds the libraries", "`, which adds the libraries")
+    assert [match[0] for match in found if not match["rest"].startswith(known)] == []
+    assert len(found) == 3

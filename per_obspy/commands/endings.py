@@ -1,11 +1,11 @@
 """Exit codes, options and final messages that several commands share."""
 
-import csv
 import json
 import sys
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -14,10 +14,15 @@ from per_obspy.errors import printable
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from per_obspy.errors import Rejection
     from per_obspy.jobs.output_folder import Result
 
 #: Exit codes; 0 is done, and 1 is left to crashes, which are bugs.
 WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
+
+
+#: Beginning of the reason of records that were left out on purpose.
+BYSTANDER = "belongs to another earthquake"
 
 
 class PageLanguage(StrEnum):
@@ -101,9 +106,43 @@ def print_and_end(
         stop_if_nothing(0, why_nothing(result.folder / "rejected.csv"))
 
 
+class Reason(NamedTuple):
+    """Reason of rejections in the order of its weight: of others last, of pairs first."""
+
+    is_bystander: bool
+    is_of_no_pair: bool
+    kind: str
+    words: str
+
+
 def why_nothing(rejected: Path) -> str:
-    """Return a message that names the table of rejections and quotes its first row."""
-    with rejected.open(encoding="utf-8", newline="") as file:
-        first = next(csv.DictReader(file), None)
-    example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
-    return printable(f"no usable record or pair: see {rejected}{example}")
+    """
+    Return a message that names the table of rejections and the most frequent reasons in it.
+
+    Pairs come first, because results are pairs; a record of another earthquake explains nothing
+    and comes last.
+    """
+    from per_obspy.tables.coverage import stored_rejections
+
+    # Line by line, as rejections may be many
+    counts, first = Counter[Reason](), dict[Reason, str]()
+    for rejection in stored_rejections(rejected):
+        reason = _reason(rejection)
+        counts[reason] += 1
+        first.setdefault(reason, f"{rejection.name}: {'; '.join(rejection.reasons)}")
+    # The reason that weighs most as it is in the table, and the next one, which may be its cause
+    ordered = sorted(counts, key=lambda reason: (*reason[:2], -counts[reason]))[:2]
+    parts = [f"first {reason.kind} {first[reason]}" for reason in ordered[:1]]
+    for reason in ordered:
+        plural = "" if counts[reason] == 1 else "s"
+        parts.append(f"{counts[reason]} {reason.kind}{plural}: {reason.words}")
+    return printable("; ".join([f"no usable record or pair: see {rejected}", *parts]))
+
+
+def _reason(rejection: "Rejection") -> Reason:
+    """Return the reason of a rejection: of pairs, which are many, its kind, else its sentence."""
+    from per_obspy.tables.coverage import kind_of
+
+    is_bystander, is_pair = rejection.reasons[0].startswith(BYSTANDER), rejection.kind == "pair"
+    words = kind_of(rejection.reasons) if is_pair else rejection.reasons[0]
+    return Reason(is_bystander, not is_pair, rejection.kind, BYSTANDER if is_bystander else words)

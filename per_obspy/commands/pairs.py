@@ -3,7 +3,6 @@
 import datetime
 import json
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,11 +20,10 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
-    from per_obspy.inventory.footprints.footprint_pairs import FootprintPairs
+    from per_obspy.tables.coverage import Search
 
-#: Rejected rows that are printed, the others are counted; and the most common reasons for
-#: rejections.
-SHOWN, COMMON = 10, 3
+#: Rejected rows that are printed; the others are counted.
+SHOWN = 10
 
 
 class _FindByDefault(TyperGroup):
@@ -89,14 +87,15 @@ def find_pairs(
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+    from per_obspy.pipeline.inputs.drawn_pairs import write_search
 
     # Names of columns, each of which may be given by an option of its own
     given = {"building_id": id_column, "height": height_column, "storeys": storeys_column}
     columns = {name: known for name, known in given.items() if known is not None}
     columns |= _named_columns(column or [])
     found = find_footprint_pairs(footprints, distance, layer, gap_std, columns)
-    places = _write_footprint_pairs(found, output)
-    _print_footprint_pairs(found.pairs, places, as_json)
+    search = write_search(found, output)
+    _print_footprint_pairs(found.pairs, search, output, as_json)
     stop_if_nothing(len(found.pairs))
 
 
@@ -114,37 +113,28 @@ def _named_columns(options: "Sequence[str]") -> dict[str, str]:
     return columns
 
 
-def _write_footprint_pairs(found: "FootprintPairs", output: Path) -> dict[str, Path]:
-    """Write the tables of pairs, rejections and buildings; return their paths."""
-    from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.buildings import write_buildings
-    from per_obspy.tables.table_files import write_rejected
+def _print_footprint_pairs(
+    table: "pd.DataFrame", search: "Search", output: Path, as_json: bool
+) -> None:
+    """Print the account of a search, for machines or with the most common reasons."""
+    from per_obspy.report.coverage import search_sentence
 
-    buildings = output.with_suffix(".buildings.parquet")
-    write_pairs(found.pairs, output)
-    write_rejected(found.pairs.attrs["rejected"], output.with_suffix(".rejected.csv"))
-    write_buildings(found.buildings, buildings)
-    return {"output": output, "buildings": buildings}
-
-
-def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_json: bool) -> None:
-    """Print the counts, for machines or with the most common reasons for rejection."""
     # Counts
-    rejected = table.attrs["rejected"]
+    rejected, buildings = table.attrs["rejected"], output.with_suffix(".buildings.parquet")
     touching = int((table["gap"] == 0.0).sum())
     if as_json:
         counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
-        print(json.dumps({name: str(path) for name, path in places.items()} | counts))
+        of_search = {"neighbours": search.neighbours, "left_out": dict(search.left_out)}
+        places = {"output": str(output), "buildings": str(buildings)}
+        print(json.dumps({**places, **counts, **of_search}))
         return
+    print(printable(search_sentence(search, "en")))
     counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
-    print(f"{counted}: {places['output']}")
+    print(f"{counted}: {output}")
     # Further files, assumptions, and reasons of rejected rows
-    print(f"  outlines and columns of all buildings: {places['buildings']}")
+    print(f"  outlines and columns of all buildings: {buildings}")
     if "assumed" in table["gap_std_source"].to_numpy():
         print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")
-    reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
-    for reason, count in reasons.most_common(COMMON):
-        print(printable(f"  {count} times: {reason}"))
 
 
 @pairs.command("check")

@@ -37,6 +37,24 @@ def state_texts(counts: "Mapping[str, int]") -> list[str]:
     return [f"{counts.get(state, 0)} {state}" for state in shown]
 
 
+def percent(probability: object) -> str:
+    """
+    Return a probability in percent: 0 and 100 only if exact, empty if unknown.
+
+    Examples
+    --------
+    >>> [percent(value) for value in (0.0, 1e-48, 0.0042, 0.52, 0.9999, 1.0, None)]
+    ['0', '< 0.1', '0.42', '52', '> 99.9', '100', '']
+    """
+    if not isinstance(probability, float) or probability != probability:
+        return ""
+    if 0.0 < probability < 0.001:
+        return "< 0.1"
+    if 0.999 < probability < 1.0:
+        return "> 99.9"
+    return f"{100.0 * probability:.3g}"
+
+
 def cell(value: object) -> str:
     """Return a value as text on one line: numbers with three digits, missing ones empty."""
     if value is None:

@@ -26,12 +26,12 @@ from per_obspy.commands.operation.logged import (
     log_ending,
     logged,
 )
-from per_obspy.commands.printing import print_table, shown_progress, state_texts
+from per_obspy.commands.printing import percent, print_table, shown_progress, state_texts
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from per_obspy.errors import Rejection
     from per_obspy.jobs.output_folder import Result
@@ -45,7 +45,7 @@ SHOWN = {
     "gap": "gap (m)",
     "demand": "demand (m)",
     "state": "pounding",
-    "probability": "probability",
+    "probability": "probability (%)",
     "expected_impact_velocity": "impact (m/s)",
     "expected_amplification": "ampl.",
 }
@@ -134,7 +134,9 @@ def run(
 
 
 def report(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    configuration: Annotated[
+        Path, typer.Argument(help="TOML file of the run, or a folder with one, as of its results.")
+    ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     language: Language = None,
     as_json: AsJson = False,
@@ -145,11 +147,11 @@ def report(
     Example: per-obspy report workflows/demo.toml
     """
     from per_obspy.config import Run, in_language, load
+    from per_obspy.pipeline.inputs.arguments import named_configuration
     from per_obspy.pipeline.run import report as report_again
 
-    settings: Path | Run = configuration
-    if language is not None:
-        settings = in_language(load(configuration, Run), language)
+    file = named_configuration(configuration)
+    settings = file if language is None else in_language(load(file, Run), language)
     with shown_progress() as progress:
         result = report_again(settings, output, progress=progress)
     print_and_end(result, as_json, print_result)
@@ -313,15 +315,22 @@ def _print_counts(record: dict[str, Any]) -> None:
     counts = record["counts"]
     if record["simulated"]:
         print(_simulated_line(counts))
+    print_coverage(record)
     for line in _earthquake_lines(record.get("earthquakes", ())):
         print(line)
-    if drawn := record.get("drawn"):
-        left_out = f"{drawn['rejected']} buildings or pairs rejected: pairs.rejected.csv"
-        print(f"{drawn['pairs']} pairs of footprints, {left_out}")
     # Stations, pairs by state, and all rejections together
     states = ", ".join(state_texts(counts))
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     print(f"{counts['stations']} stations, {counts['pairs']} pairs: {states}; {rejected} rejected")
+
+
+def print_coverage(record: "Mapping[str, Any]") -> None:
+    """Print the rows that have a verdict, and those that are left out with their reasons."""
+    from per_obspy.report.coverage import coverage_sentences
+    from per_obspy.tables.coverage import Coverage
+
+    for sentence in coverage_sentences(Coverage.of_record(record)):
+        print(printable(sentence))
 
 
 def _print_warnings(warnings: dict[str, list[str]]) -> None:
@@ -407,7 +416,11 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 def _print_worst(folder: Path, count: int) -> None:
     """Print the worst pairs as a table."""
     titles = list(SHOWN.values())
-    worst = _worst_rows(folder, list(SHOWN), count)
+    at = list(SHOWN).index("probability")
+    worst = [
+        (*row[:at], percent(row[at]), *row[at + 1 :])
+        for row in _worst_rows(folder, list(SHOWN), count)
+    ]
     print_table(f"The {len(worst)} worst pairs", titles, worst)
 
 

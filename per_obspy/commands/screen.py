@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -25,8 +25,8 @@ from per_obspy.commands.operation.logged import (
     log_ending,
     logged,
 )
-from per_obspy.commands.printing import print_table, state_texts
-from per_obspy.commands.run import print_nothing, print_result
+from per_obspy.commands.printing import percent, print_table, state_texts
+from per_obspy.commands.run import print_coverage, print_nothing, print_result
 from per_obspy.errors import printable
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from per_obspy.config import Design, Run
     from per_obspy.jobs.output_folder import Result
+    from per_obspy.tables.coverage import Coverage
 
 #: Columns of the worst pairs that are printed: by a design spectrum, and of an ensemble where the
 #: table has them.
@@ -62,9 +63,20 @@ ENSEMBLE_COLUMNS = (
 WORST = 10
 
 
+class Screened(NamedTuple):
+    """Table, coverage and files of a screening by a spectrum, ``rejected.csv`` last."""
+
+    table: "pd.DataFrame"
+    coverage: "Coverage"
+    files: list[Path]
+
+
 def screen(
     configuration: Annotated[
-        Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")
+        Path,
+        typer.Argument(
+            help="TOML file: a run, a spectrum and pairs, or scenarios; or a folder with one."
+        ),
     ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     dask: Dask = None,
@@ -86,8 +98,13 @@ def screen(
     from per_obspy.config import Design, Ensemble, screening_kind
     from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.ensemble import screen_scenarios
+    from per_obspy.pipeline.inputs.arguments import named_configuration
+    from per_obspy.pipeline.inputs.input_kinds import Kind
     from per_obspy.pipeline.run import screen as screen_again
 
+    configuration = named_configuration(
+        configuration, (Kind.CONFIGURATION, Kind.DESIGN, Kind.ENSEMBLE)
+    )
     # The kind decides which options hold
     kind = screening_kind(configuration)
     if strict and kind in (Design, Ensemble):
@@ -119,10 +136,8 @@ def _in_language(configuration: Path, language: Language) -> "Path | Run":
     return configuration if language is None else in_language(load(configuration, Run), language)
 
 
-def _screened_by_spectrum(
-    configuration: Path, output: Path | None, language: Language
-) -> "tuple[pd.DataFrame, list[Path]]":
-    """Screen pairs by a design or user spectrum instead of a record; return table and files."""
+def _screened_by_spectrum(configuration: Path, output: Path | None, language: Language) -> Screened:
+    """Screen pairs by a design or user spectrum instead of a record."""
     from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.inputs.extras import require_extras
@@ -135,40 +150,61 @@ def _screened_by_spectrum(
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)
-    files = _write_design(settings, table, output or settings.output)
+    coverage = _coverage(settings, table)
+    files = _write_design(settings, table, coverage, output or settings.output)
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
     for sentence in pairs.attrs["suspicions"]:
         print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
-    return table, files
+    return Screened(table, coverage, files)
 
 
-def _end_design(design: "tuple[pd.DataFrame, list[Path]]", as_json: bool, quiet: bool) -> None:
+def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
     """Print the result of a screening by a spectrum, and stop without a usable pair."""
-    table, files = design
+    table, coverage, files = design
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)
     rejected = len(table.attrs["rejected"])
     if as_json:
         names = [str(path) for path in files]
-        print(json.dumps({"pairs": len(table), **counts, "rejected": rejected, "files": names}))
+        known = {"rejected": rejected, "coverage": coverage.as_record(), "files": names}
+        print(json.dumps({"pairs": len(table), **counts, **known}))
     elif not quiet:
+        print_coverage({"coverage": coverage.as_record()})
         _print_spectrum_result(table, counts, rejected, files)
     if table.empty:
         stop_if_nothing(0, why_nothing(files[-1]))
 
 
-def _write_design(settings: "Design", table: "pd.DataFrame", folder: Path) -> list[Path]:
+def _write_design(
+    settings: "Design", table: "pd.DataFrame", coverage: "Coverage", folder: Path
+) -> list[Path]:
     """Write the files of a screening by a design spectrum, ``rejected.csv`` last."""
     from per_obspy.pipeline.results.table_report import report_design
     from per_obspy.tables.design import write_design
 
     *files, rejected = write_design(table, folder)
-    made = report_design(settings, table, folder)
+    made = report_design(settings, table, coverage, folder)
     for fault in made.faults:
         print(f"per-obspy: {fault}", file=sys.stderr)
     return [*files, *made.outputs, rejected]
+
+
+def _coverage(settings: "Design", table: "pd.DataFrame") -> "Coverage":
+    """Return the coverage of a screening by a spectrum."""
+    from per_obspy.inventory.files.reading import ALL, checked_file
+    from per_obspy.pipeline.losses import areas_left_out, search_of_tables
+    from per_obspy.tables.coverage import CoverageTally
+
+    rejected = table.attrs["rejected"]
+    rows = len(table) + len(rejected)
+    tally = CoverageTally(search_of_tables({settings.pairs: rows}))
+    tally.add(rejected)
+    # The file is read again for the places of what is left out
+    for block in checked_file(settings.pairs).rows(ALL) if rejected else ():
+        tally.add((), areas_left_out(settings.totals, rejected, block))
+    return tally.coverage({"pairs": len(table), "rejected_pair": len(rejected)})
 
 
 def _state_counts(table: "pd.DataFrame") -> dict[str, int]:
@@ -201,6 +237,7 @@ def _print_ensemble(result: "Result") -> None:
         print("Up to date: these scenarios were joined before.")
     if record["simulated"]:
         print("The ground motion of a scenario is SIMULATED.")
+    print_coverage(record)
     counts = record["counts"]
     print(
         f"{len(record['scenarios'])} scenarios, {counts['pairs']} pairs; "
@@ -217,6 +254,15 @@ def _print_ensemble(result: "Result") -> None:
 
 def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") -> None:
     """Print some columns of the worst pairs as a table."""
-    titles = [name.replace("_", " ") for name in columns]
-    rows = worst[list(columns)].itertuples(index=False)
+    from per_obspy.report.layers.qgis_style import column_aliases
+    from per_obspy.screening.columns import known_column
+
+    # Probabilities in percent, all else in the unit of its column
+    chances = [name for name in columns if name.endswith("probability")]
+    shown = worst[list(columns)].astype(dict.fromkeys(chances, object))
+    for name in chances:
+        shown[name] = worst[name].map(percent)
+    units = {name: column.unit for name in columns if (column := known_column(name))}
+    titles = list(column_aliases(columns, units | dict.fromkeys(chances, "%")).values())
+    rows = shown.itertuples(index=False)
     print_table(f"The {len(worst)} worst pairs", titles, rows)

@@ -115,13 +115,13 @@ def notify_failure(settings: Notify, folder: Path, name: str, reason: str) -> tu
 
 
 def class_counts(folder: Path) -> dict[str, int]:
-    """Return the number of pairs in each class of the risk table of a folder, by name."""
+    """Return the number of pairs in each class of the risk table of a folder, worst first."""
     import duckdb
 
     table = table_files(folder)
     if not table:
         return {}
-    query = "SELECT risk_class, count(*) FROM read_parquet(?) GROUP BY 1 ORDER BY 1"
+    query = "SELECT risk_class, count(*) FROM read_parquet(?) GROUP BY 1 ORDER BY min(rank)"
     with duckdb.connect() as database:
         rows = database.execute(query, [[str(path) for path in table]]).fetchall()
     return {str(label): int(count) for label, count in rows}

@@ -31,6 +31,7 @@ from per_obspy.pipeline.results.table_report import report_ensemble
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
+from per_obspy.tables.coverage import Coverage, most_first
 from per_obspy.tables.ensemble import Scenarios, write_ensemble
 from per_obspy.tables.ranked.ranked_files import table_files, table_outputs
 
@@ -113,19 +114,40 @@ def _joined(
         scenario.name: ScenarioRun(load(scenario.run, Run), runs[scenario.name].folder)
         for scenario in settings.scenario
     }
-    made = report_ensemble(
-        settings, folder, simulated, counts["pairs"], ScenarioRuns(scenarios_run)
-    )
+    coverage = _coverage(runs, counts)
+    made = report_ensemble(settings, folder, simulated, coverage, ScenarioRuns(scenarios_run))
     # Rejections make a result partial, those of a run too
     is_partial = any(result.record["partial"] for result in runs.values())
     return {
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": counts["rejected_pair"] > 0 or is_partial,
         "counts": counts,
+        "coverage": coverage.as_record(),
         "faults": made.faults,
         "outputs": file_hashes(folder, [*files, *made.outputs]),
         "versions": software_versions(),
     }
+
+
+def _coverage(runs: Mapping[str, Result], counts: Mapping[str, int]) -> Coverage:
+    """Return the coverage of an ensemble: pairs with a probability in every scenario."""
+    of_runs = [Coverage.of_record(result.record) for result in runs.values()]
+    fullest, widest = min(of_runs, key=_left_out), max(of_runs, key=lambda one: one.pairs)
+    pairs, rejected = counts["pairs"], counts["rejected_pair"]
+    rows = max(pairs + rejected, *(one.rows for one in of_runs))
+    # Rows that every scenario leaves out have the reasons of the one that leaves out least
+    kinds = {"no probability in every scenario": rejected} if rejected else {}
+    everywhere = rows - pairs - rejected
+    if everywhere == _left_out(fullest):
+        kinds |= fullest.left_out
+    elif everywhere:
+        kinds["left out of every scenario"] = everywhere
+    return Coverage(rows, pairs, most_first(kinds), fullest.areas, widest.search)
+
+
+def _left_out(coverage: Coverage) -> int:
+    """Return the number of rows without a verdict."""
+    return coverage.rows - coverage.screened
 
 
 def _check_runs(settings: Ensemble, configuration: Path, folder: Path) -> None:

@@ -30,6 +30,7 @@ from per_obspy.report.summary.statements import event_sentences
 from per_obspy.report.words import number
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.ranked.ranked_table import RankedTable, ranked_table
 from per_obspy.tables.totals import (
@@ -92,7 +93,11 @@ class _Pieces(NamedTuple):
 
 
 def reported(
-    settings: Run, folder: Path, stations: Sequence[FinishedStation], progress: Progress
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    coverage: Coverage,
+    progress: Progress,
 ) -> Report:
     """
     Write the report of the results in the output folder.
@@ -107,6 +112,8 @@ def reported(
         Of the results; without a risk table only the spectra can be reported.
     stations : sequence of FinishedStation
         With station files.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     progress : callable
         Called when it begins and ends.
     """
@@ -124,10 +131,10 @@ def reported(
         write_totals(summary.totals.table, folder / "totals.csv")
         report.outputs.append(folder / "totals.csv")
         report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
-        _write_summary(settings, summary, folder, place, report)
+        _write_summary(settings, summary, folder, place, coverage, report)
         _draw_figures(summary, place, stations, folder, report)
         with report.tried(folder / "report.html"):
-            found = (*summary.page, summary.totals.table)
+            found = (*summary.page, summary.totals.table, coverage)
             write_run_page(settings, folder, stations, found, simulated)
     progress("report", 1, 1)
     return report
@@ -165,7 +172,12 @@ def _epicentre_of(event: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def _write_summary(
-    settings: Run, summary: RiskSummary, folder: Path, place: Region, report: Report
+    settings: Run,
+    summary: RiskSummary,
+    folder: Path,
+    place: Region,
+    coverage: Coverage,
+    report: Report,
 ) -> None:
     """Write summary, KML and workbook."""
     language = settings.report.language
@@ -176,7 +188,7 @@ def _write_summary(
     source = [f"{line}."] if line else []
     source += event_sentences(_event(settings, folder, place), language)
     stations = read_stations(folder / "stations.csv")
-    written = Screening(folder, "risk", place, source, settings.spreadsheet, language)
+    written = Screening(folder, "risk", place, source, coverage, settings.spreadsheet, language)
     written = written._replace(stations=stations, areas=summary.totals.table)
     write_results(written, summary.notes, summary.shown, report)
 

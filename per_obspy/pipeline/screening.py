@@ -14,17 +14,20 @@ import pyarrow.parquet as pq
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import remove_file
-from per_obspy.inventory.files.reading import PairInventory
+from per_obspy.inventory.files.raw_rows import RawRows
+from per_obspy.inventory.files.reading import PairChunk, PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.losses import areas_left_out, search_of_tables
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.results.served_stations import Served
 from per_obspy.pipeline.rows.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.tables.coverage import Coverage, CoverageTally
 from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
@@ -73,6 +76,8 @@ class Screened(NamedTuple):
         Whether the work of a chunk failed unexpectedly.
     pair_tables : PairNotes
         Sentences on the recognised form of the pair tables, and on what is odd in them.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     """
 
     outputs: list[Path]
@@ -81,6 +86,7 @@ class Screened(NamedTuple):
     unplaced: tuple[Rejection, ...]
     failed: bool
     pair_tables: PairNotes
+    coverage: Coverage
 
 
 def screened(
@@ -117,9 +123,8 @@ def screened(
     maps = shakemap_files(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
-    parts, notes = list[Part](), PairNotes()
-    if stations or maps:
-        parts, notes = _parts(settings, folder, ground, executor, progress)
+    screens = _parts if stations or maps else _no_parts
+    parts, notes, tally = screens(settings, folder, ground, executor, progress)
     states, served, rows = Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
@@ -132,7 +137,13 @@ def screened(
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
     return Screened(
-        outputs, counts, Served(served, rows.served), unplaced, _any_failed(parts, rows), notes
+        outputs,
+        counts,
+        Served(served, rows.served),
+        unplaced,
+        rows.failed or _any_failed(parts),
+        notes,
+        tally.coverage(counts),
     )
 
 
@@ -160,9 +171,9 @@ def _ranked(
     return risk
 
 
-def _any_failed(parts: Sequence[Part], rows: BuildingRowsDone) -> bool:
+def _any_failed(parts: Sequence[Part]) -> bool:
     """Return whether the work of a chunk failed unexpectedly."""
-    return rows.failed or any(part.failed for part in parts)
+    return any(part.failed for part in parts)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
@@ -191,26 +202,46 @@ def shakemap_files(settings: Run) -> tuple[Path, ...]:
 
 def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
-) -> tuple[list[Part], PairNotes]:
-    """Compute the chunks, remove other parts, and return the parts in order."""
+) -> tuple[list[Part], PairNotes, CoverageTally]:
+    """Compute the chunks, and return the parts in order, sentences and what is left out."""
+    inventory = _inventory(settings, folder, ground)
+    progress("screening", 0, inventory.count)
+    # Rows are counted as chunks are finished, in whichever order
+    parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
+    tally = CoverageTally(search_of_tables(inventory.rows))
+    workers = settings.workers or usable_processors()
+    size = _chunk_rows(inventory.count, workers)
+    jobs = _jobs(settings, folder, ground, inventory.chunks(size), raw)
+    for part in do_chunks(jobs, workers, executor):
+        parts.append(part)
+        rows += part.rows
+        # What is left out is read back chunk by chunk, never as a whole
+        lost, block = list(rejections([part])), raw.pop(part.number)
+        tally.add(lost, areas_left_out(settings.totals, lost, block))
+        progress("screening", min(rows, inventory.count), inventory.count)
+    _remove_others(_chunk_folder(folder), parts)
+    # Findings about the tables, after all their rows were read
+    return sorted(parts, key=lambda part: part.number), _notes(inventory), tally
+
+
+def _no_parts(*_: object) -> tuple[list[Part], PairNotes, CoverageTally]:
+    """Return what is screened without any ground motion."""
+    return [], PairNotes(), CoverageTally()
+
+
+def _notes(inventory: PairInventory) -> PairNotes:
+    """Return the sentences on pair tables whose rows were read."""
+    return PairNotes(tuple(inventory.recognised()), tuple(inventory.suspicions.sentences()))
+
+
+def _inventory(settings: Run, folder: Path, ground: GroundFiles) -> PairInventory:
+    """Open the pair tables of a run."""
     form = settings.pairs.form if settings.pairs else None
     inventory = PairInventory(pair_files(settings, folder, ground.stations), form)
     area = settings.totals.area
     if area and area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {area!r}")
-    progress("screening", 0, inventory.count)
-    # Rows are counted as chunks are finished, in whichever order
-    parts, rows = list[Part](), 0
-    workers = settings.workers or usable_processors()
-    jobs = _jobs(settings, folder, ground, inventory, _chunk_rows(inventory.count, workers))
-    for part in do_chunks(jobs, workers, executor):
-        parts.append(part)
-        rows += part.rows
-        progress("screening", min(rows, inventory.count), inventory.count)
-    _remove_others(_chunk_folder(folder), parts)
-    # Findings about the tables, after all their rows were read
-    notes = PairNotes(tuple(inventory.recognised()), tuple(inventory.suspicions.sentences()))
-    return sorted(parts, key=lambda part: part.number), notes
+    return inventory
 
 
 def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
@@ -234,10 +265,15 @@ def _chunk_rows(count: int, workers: int) -> int:
 
 
 def _jobs(
-    settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory, rows: int
+    settings: Run,
+    folder: Path,
+    ground: GroundFiles,
+    chunks: Iterator[PairChunk],
+    raw: dict[int, RawRows],
 ) -> Iterator[ChunkJob]:
-    """Yield one job per chunk of so many rows of the inventory."""
-    for number, chunk in enumerate(inventory.chunks(rows)):
+    """Yield one job per chunk of the inventory, and keep its rows until it is done."""
+    for number, chunk in enumerate(chunks):
+        raw[number] = chunk.rows
         part = _chunk_folder(folder) / f"{number:06}.parquet"
         yield ChunkJob(number, chunk, ground, settings.building, settings.screening, part)
 

@@ -52,6 +52,7 @@ from per_obspy.progress import Progress, timed
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.resume import write_status
 from per_obspy.screening.warmup import compiling
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_files import remove_table
 from per_obspy.tables.station_summary import StationSummary, write_stations
 
@@ -121,7 +122,8 @@ def new_report(asked: RunSettings, record: dict[str, Any], progress: Progress) -
     settings, folder = asked.settings, asked.folder
     earlier = _earlier_stations(settings, folder)
     stations, _ = compared_stations(earlier, record.get("earthquakes", ()), settings.records)
-    made = reported(settings, folder, _usable(stations), progress)
+    coverage = Coverage.of_record(record)
+    made = reported(settings, folder, _usable(stations), coverage, progress)
     outputs = record["outputs"] | file_hashes(folder, made.outputs)
     # A picture or layer that failed is made by the next run
     key = "" if made.faults else record["key"]
@@ -233,7 +235,7 @@ def _later_stages(
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with timed(seconds, "report"):
-        made = reported(settings, folder, usable, progress)
+        made = reported(settings, folder, usable, found.coverage, progress)
         outputs = [*found.outputs, *table.files, *made.outputs]
     outcome = _outcome(found, stations)
 
@@ -249,6 +251,7 @@ def _later_stages(
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
+        "coverage": found.coverage.as_record(),
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,

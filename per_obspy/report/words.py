@@ -6,7 +6,8 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.columns import DEMAND_RULES, FLAGS
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,6 +23,16 @@ STATE_WORDS = {
     "unlikely": "is unlikely to pound",
     "no": "does not pound",
     "unknown": "may pound: its gap is unknown",
+}
+
+#: Measures for a pair that needs no wider gap as far as is known, by :func:`prevention_kind`.
+PREVENTION_WORDS = {
+    "unknown_gap": "Prevention: the gap is unknown and must be measured first.",
+    "not_computed": "Prevention: not computed {motion}.",
+    "in_doubt": (
+        "Prevention: the gap is enough for the likeliest inputs; the probability counts others."
+    ),
+    "nothing": "Prevention: none needed {motion}.",
 }
 
 
@@ -95,6 +106,43 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
     return [*judged, *described, *_prevention_lines(pair), *_flag_lines(pair)]
 
 
+def prevention_kind(pair: "Mapping[Any, Any] | pd.Series[Any]") -> str:
+    """
+    Return the case of the measures for a pair.
+
+    ``unknown_gap`` and ``not_computed`` (the table has no demand) are no promise; ``gap``: a wider
+    one is needed; ``in_doubt``: the gap is enough for the likeliest inputs, but the pair may pound
+    at others; ``nothing``: it does not pound.
+
+    Examples
+    --------
+    >>> prevention_kind({"gap": 0.1, "demand": 0.2, "state": "yes"}), prevention_kind({"gap": 0.1})
+    ('gap', 'not_computed')
+    """
+    gap = number(pair, "gap")
+    if not math.isfinite(gap):
+        return "unknown_gap"
+    missing = missing_gap(pair)
+    if not math.isfinite(missing):
+        return "not_computed"
+    if missing > 0.0:
+        return "gap"
+    # An assumed gap may be another one
+    if pair.get("risk_class") == UNKNOWN_CLASS:
+        return "unknown_gap"
+    return "nothing" if pair.get("state") == "no" else "in_doubt"
+
+
+def missing_gap(pair: "Mapping[Any, Any] | pd.Series[Any]") -> float:
+    """Return demand minus gap where it is positive, m; NaN where either is unknown."""
+    missing = number(pair, "missing_gap")
+    if math.isfinite(missing):
+        return missing
+    # Tables of other versions may lack the column
+    short = number(pair, "demand") - number(pair, "gap")
+    return max(short, 0.0) if math.isfinite(short) else math.nan
+
+
 def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
     """Return a number of a row, NaN where there is none."""
     value = pair.get(name)
@@ -127,8 +175,9 @@ def _gap_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on the gap and the needed gap."""
     lines = [f"Gap: {length_text(number(pair, 'gap'))}."]
     if math.isfinite(needed := number(pair, "demand")):
-        rule = _text(pair, "demand_rule").replace("_", " ")
-        lines.append(f"Gap needed: {length_text(needed)}, by {rule or 'an unknown rule'}.")
+        rule = _text(pair, "demand_rule")
+        words = DEMAND_RULES.get(rule, name_text(rule) or "rule unknown")
+        lines.append(f"Gap needed: {length_text(needed)} ({words}).")
     return lines
 
 
@@ -181,15 +230,27 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on measures that prevent or soften pounding."""
-    lines = list[str]()
+    kind, lines = prevention_kind(pair), list[str]()
+    if kind != "gap":
+        return [PREVENTION_WORDS[kind].format(motion=_motion_name(pair))]
     # More gap, more damping, a softer contact
-    if (missing := number(pair, "missing_gap")) > 0:
-        lines.append(f"A gap wider by {length_text(missing)} would have kept them apart.")
+    missing = length_text(missing_gap(pair))
+    would = "would keep" if _text(pair, "spectrum") else "would have kept"
+    lines.append(f"A gap wider by {missing} {would} them apart.")
+    if not _text(pair, "station"):
+        return [*lines, "Damping and bumpers: not computed without a record."]
     if (damping := number(pair, "supplemental_damping")) > 0:
         lines.append(f"So would {100 * damping:.2g} percent more damping in both.")
-    if missing > 0 and math.isfinite(rebound := number(pair, "bumper_restitution")):
+    if (rebound := number(pair, "bumper_restitution")) < 1.0:
         lines.append(f"A bumper of restitution {rebound:.2g} or less would soften it.")
     return lines
+
+
+def _motion_name(pair: Mapping[str, Any]) -> str:
+    """Return the ground motion of a pair as the end of a sentence."""
+    if _text(pair, "spectrum"):
+        return "under this spectrum"
+    return "in these scenarios" if _text(pair, "worst_scenario") else "in this event"
 
 
 def _flag_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -277,6 +277,18 @@ RECORD_FLAGS = (
     "record_warning",
 )
 
+#: Rules of the demand by which ``demand_rule`` names them, in words.
+DEMAND_RULES: dict[str, str] = {
+    "exact": "exact for the record",
+    "per_white_noise": "estimate from PER",
+    "per_record": "estimate from PER and the record's correlation",
+    "linearized": "estimate for yielding buildings",
+    "srss": "SRSS, because a period is derived",
+    "shakemap": "from a ShakeMap",
+    "sd_white_noise": "estimate from the spectrum",
+    "sd_srss": "SRSS of the spectrum, because a period is derived",
+}
+
 #: Flags of a pair and the meaning of each.
 FLAGS: dict[str, str] = {
     "unknown_gap": (

@@ -113,7 +113,12 @@ def _components(stream: Stream) -> dict[str, Trace]:
     reasons = []
     for trace in stream:
         units = trace.stats.get("units")
-        if units != "m/s2":
+        if units is None:
+            reasons.append(
+                f"{trace.id} has no stats.units: expected acceleration in m/s2, as "
+                "per_obspy.process returns it, or marked by stats.units = 'm/s2'"
+            )
+        elif units != "m/s2":
             reasons.append(f"{trace.id} is in {units!r}, not m/s2")
 
     # One or two horizontals, and at most one vertical

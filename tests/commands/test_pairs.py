@@ -47,7 +47,7 @@ def test_pairs_come_from_footprints(call, footprints, tmp_path, words):
     code, out, _ = call(*words, footprints, "-o", output)
     assert code == 0
     assert "2 pairs, 1 of them touching, 1 rejected" in out
-    assert "1 times: the polygon repeats an earlier one" in out
+    assert "outlines that are no usable building: 1 repeated" in out
     pairs = read_pairs(output)
     assert pairs["gap"].tolist()[0] == 0.0
     assert 1.0 < pairs["gap"].tolist()[1] < 1.2  # 1e-5 degrees on the equator are 1.11 m
@@ -64,6 +64,8 @@ def test_options_may_come_first_and_json_is_for_machines(call, footprints, tmp_p
         "pairs": 1,
         "touching": 1,
         "rejected": 1,
+        "neighbours": 1,
+        "left_out": {},
     }
 
 

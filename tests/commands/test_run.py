@@ -35,6 +35,18 @@ def test_records_and_pairs_are_a_run(records, tmp_path, monkeypatch, call):
     assert (code, json.loads(out)["did_nothing"]) == (0, True)
     code, out, _ = call("run", folder, "--set", "screening.target_amplification=1.5", "--json")
     assert (code, json.loads(out)["did_nothing"]) == (0, False)
+    # Report and screening take the folder of the results too
+    for command in ("report", "screen"):
+        code, out, err = call(command, folder)
+        assert code == 0, err
+        assert "All rows of the pair table are screened: 1." in out
+    code, _, err = call("report", records)
+    assert code == 2
+    assert "holds no configuration of a run: name a TOML file, or a folder of one" in err
+    (folder / "other.toml").write_bytes((folder / "configuration.toml").read_bytes())
+    code, _, err = call("screen", folder)
+    assert code == 2
+    assert "holds several configurations, name one: configuration.toml, other.toml" in err
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from per_obspy.commands.endings import why_nothing
+from per_obspy.errors import Rejection
+from per_obspy.tables.table_files import write_rejected
+
 PAIRS = """\
 pair_id,longitude_1,latitude_1,height_1,period_1,longitude_2,latitude_2,height_2,period_2,gap,owner
 a,0.3,0.0,12,0.5,0.3001,0.0,12,1.0,0.05,x
@@ -41,6 +45,41 @@ def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     pd.testing.assert_frame_equal(
         pd.read_parquet(tmp_path / "out" / "design.parquet")[["gap"]], table[["gap"]]
     )
+
+
+def test_a_folder_stands_for_its_only_configuration(screened, tmp_path, call):
+    code, out, _ = call("screen", tmp_path)
+    assert (code, out) == screened()[:2]
+
+
+def test_coverage_comes_first_and_numbers_have_units(screened):
+    _, out, _ = screened()
+    lines = out.splitlines()
+    assert lines[0].startswith("1 of 2 neighbouring pairs (50 %) have NO VERDICT")
+    assert lines[1].startswith("1 of 2 rows of the pair table are screened; left out: 1 (1 out")
+    assert "r0 c33 (0.00" in lines[1]
+    head = next(line for line in lines if "pair id" in line)
+    for unit in ("(s)", "(m)", "(m/s)", "(%)"):
+        assert unit in out
+    assert "gap (m)" in head
+
+
+def test_a_pair_of_no_place_is_told_by_its_reason(tmp_path):
+    """Catch a last line that names a record of another earthquake while no pair has a station."""
+    other = "belongs to another earthquake: starts 2020-01-01, the screened one 2021-01-01"
+    record = Rejection("record", "XX.A..HNE", "a.mseed", None, (other,))
+    station = Rejection("station", "XX.B", "b", None, ("its coordinates are unknown",))
+    pairs = [
+        Rejection("pair", f"P{i}", "p.csv", i, ("no station has coordinates",)) for i in (1, 2)
+    ]
+    write_rejected([record, station, *pairs], tmp_path / "rejected.csv")
+    said = why_nothing(tmp_path / "rejected.csv")
+    assert said.startswith(f"no usable record or pair: see {tmp_path / 'rejected.csv'}; first pair")
+    assert "P1: no station has coordinates; 2 pairs: no station with coordinates" in said
+    assert said.endswith("1 station: its coordinates are unknown")
+    # It is said where nothing else is there
+    write_rejected([record], tmp_path / "rejected.csv")
+    assert other in why_nothing(tmp_path / "rejected.csv")
 
 
 def test_json_is_for_machines(screened):

@@ -34,7 +34,8 @@ def result_of(folder, classes, state="complete"):
     import pandas as pd
 
     folder.mkdir(exist_ok=True)
-    pd.DataFrame({"risk_class": classes}).to_parquet(folder / "risk.parquet")
+    table = pd.DataFrame({"rank": range(1, len(classes) + 1), "risk_class": classes})
+    table.to_parquet(folder / "risk.parquet")
     (folder / "summary.txt").write_text("the summary")
     return Result(folder, {"state": state}, did_nothing=False)
 
@@ -47,8 +48,9 @@ def test_a_first_result_and_changed_counts_are_notified_once(tmp_path, sent):
     kinds = [facts["PER_OBSPY_KIND"] for facts, _ in messages()]
     assert kinds == ["first", "changed"]
     first, changed = (facts["PER_OBSPY_TITLE"] for facts, _ in messages())
-    assert first == "Town: 1 green, 1 red (first result)"
-    assert changed == "Town: 2 red (changed from 1 green, 1 red)"
+    # The class of the worst pair comes first, whatever its name is
+    assert first == "Town: 1 red, 1 green (first result)"
+    assert changed == "Town: 2 red (changed from 1 red, 1 green)"
     assert messages()[0][1].startswith("the summary\n\nReport: ")
     assert class_counts(folder) == {"red": 2}
 

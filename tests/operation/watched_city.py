@@ -157,7 +157,8 @@ def quick_run(settings: Run, *others: object) -> Result:
     # One pair per station, of a state that follows from the earthquake
     state = "yes" if "7" in magnitude else "no"
     names = [path.stem for path in records]
-    risk = {"pair_id": names, "state": [state] * len(names), "risk_class": ["low"] * len(names)}
+    risk = {"rank": range(1, len(names) + 1), "pair_id": names}
+    risk |= {"state": [state] * len(names), "risk_class": ["low"] * len(names)}
     pd.DataFrame(risk).to_parquet(folder / "risk.parquet")
     stations = pd.DataFrame({"station": names, "state": ["used"] * len(names)})
     stations.to_csv(folder / "stations.csv", index=False)

@@ -336,3 +336,90 @@ def test_a_changed_map_changes_every_chunk(copied):
     write_shakemap(copied / "grid.xml", longitudes=(-0.5, 0.2, 1.1))
     counts = run(copied / "map.toml", executor=InProcess()).record["counts"]
     assert (counts["stations_resumed"], counts["chunks_resumed"]) == (3, 0)
+
+
+@pytest.fixture(scope="module")
+def half_lost(finished, tmp_path_factory):
+    """A run of 60 pairs, of which 20 are far from every station and 8 have no height or period."""
+    folder = tmp_path_factory.mktemp("lost")
+    shutil.copytree(finished[0] / "out" / "stations", folder / "out" / "stations")
+    table = pd.read_csv(finished[0] / "out" / "pairs.csv").assign(ward="Port")
+    far = table.index < 20
+    table.loc[far, ["longitude_1", "longitude_2"]] += 50.0
+    table.loc[far, "ward"] = "Desert"
+    sizes = [f"{name}_1" for name in ("height", "storeys", "period") if f"{name}_1" in table]
+    table.loc[20:27, sizes] = np.nan
+    table.to_csv(folder / "pairs.csv", index=False)
+    with real_reports():
+        write_configuration(folder, '[pairs]\nfile = "pairs.csv"\n[totals]\narea = "ward"\n')
+        return folder, run(folder / "run.toml", executor=InProcess()).record
+
+
+def test_what_is_left_out_is_counted_with_reasons_and_areas(half_lost):
+    folder, record = half_lost
+    rejected = pd.read_csv(folder / "out" / "rejected.csv")
+    found = record["coverage"]
+    assert (found["rows"], found["screened"]) == (60, 32)
+    # Counted once more from the tables themselves
+    assert found["screened"] == len(pd.read_parquet(folder / "out" / "risk.parquet"))
+    assert sum(found["left_out"].values()) == (rejected["kind"] == "pair").sum()
+    assert list(found["left_out"].items()) == [
+        ("no station within reach", 20),
+        ("no height, storeys or period", 8),
+    ]
+    assert [tuple(area) for area in found["areas"]] == [("Desert", 20), ("Port", 8)]
+
+
+def test_coverage_is_the_first_number_everywhere(half_lost, call):
+    folder, _ = half_lost
+    warning = "28 of 60 neighbouring pairs (47 %) have NO VERDICT"
+    account = "32 of 60 rows of the pair table are screened; left out: 28 (20 no station"
+    code, said, _ = call("run", folder / "run.toml")
+    assert code == 0
+    # Up to date, simulated, and then what has no verdict
+    assert warning in said.splitlines()[2]
+    assert account in said.splitlines()[3]
+    content = page_content(folder / "out" / "report.html")
+    assert content["warns"]
+    assert content["coverage"][0].startswith(warning)
+    assert content["coverage"][1].startswith(account)
+    assert content["numbers"][0] == ["32", "of 60 pairs are screened"]
+    text = (folder / "out" / "summary.txt").read_text()
+    assert text.startswith("28 of 60 neighbouring pairs (47 percent) have NO VERDICT")
+    numbers = text.split("FIVE NUMBERS\n")[1]
+    assert numbers.startswith("32 of 60 pairs are screened.")
+
+
+@pytest.mark.parametrize("size", [7, 25])
+def test_coverage_does_not_depend_on_chunks(half_lost, tmp_path, monkeypatch, size):
+    folder, record = half_lost
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    shutil.rmtree(tmp_path / "out" / "chunks")
+    monkeypatch.setattr(CHUNK, size)
+    again = screen(tmp_path / "run.toml", executor=InProcess()).record
+    assert again["coverage"] == record["coverage"]
+
+
+def test_a_report_alone_says_the_same(half_lost, tmp_path):
+    folder, record = half_lost
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    before = (tmp_path / "out" / "summary.txt").read_bytes()
+    with real_reports():
+        assert report(tmp_path / "run.toml").record["coverage"] == record["coverage"]
+    assert (tmp_path / "out" / "summary.txt").read_bytes() == before
+
+
+def test_cells_are_named_with_their_places_across_the_date_line(half_lost, tmp_path):
+    folder, _ = half_lost
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    table = pd.read_csv(tmp_path / "pairs.csv")
+    table.loc[:19, ["longitude_1", "longitude_2"]] = 179.9999, -179.9997
+    table.loc[:19, ["latitude_1", "latitude_2"]] = 0.004
+    table.to_csv(tmp_path / "pairs.csv", index=False)
+    write_configuration(tmp_path, '[pairs]\nfile = "pairs.csv"\n')
+    found = screen(tmp_path / "run.toml", executor=InProcess()).record["coverage"]
+    name, count = found["areas"][0]
+    assert count == 20
+    place = [float(number) for number in name.partition("(")[2].strip(")").split(", ")]
+    # Half a cell of 1 km at most
+    assert_allclose(place, [0.004, -180.0], atol=0.0046)

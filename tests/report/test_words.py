@@ -37,7 +37,7 @@ def test_every_number_of_a_pair_is_said():
         "Pair P7 likely pounds.",
         "Probability of contact: 52 of 100.",
         "Gap: 5 cm.",
-        "Gap needed: 12.3 cm, by exact.",
+        "Gap needed: 12.3 cm (exact for the record).",
         "Expected impact velocity: 22 cm/s; in 84 of 100 cases not above 31 cm/s.",
         "In this record: 4 impacts, the fastest 40 cm/s.",
         "Building 1 (tower): period 0.23 s.",
@@ -61,6 +61,34 @@ def test_an_unknown_gap_is_no_promise():
     assert lines[0] == "Pair P7 may pound: its gap is unknown."
     assert "Gap: unknown." in lines
     assert not any(line.startswith("Probability") for line in lines)
+
+
+BARE = {"pair_id": "P7", "rank": 1, "gap": 0.3, "demand": 0.1, "state": "no"}
+
+
+@pytest.mark.parametrize(
+    ("pair", "expected"),
+    [
+        (
+            BARE | {"station": "XX.ONE", "missing_gap": 0.0},
+            "Prevention: none needed in this event.",
+        ),
+        (BARE | {"spectrum": "code.csv"}, "Prevention: none needed under this spectrum."),
+        (BARE | {"state": "possible"}, "Prevention: the gap is enough for the likeliest inputs;"),
+        (BARE | {"gap": np.nan, "state": "unknown"}, "Prevention: the gap is unknown"),
+        # The configuration assumes the gap
+        (BARE | {"risk_class": "gap unknown"}, "Prevention: the gap is unknown"),
+        ({"pair_id": "P7", "gap": 0.3, "worst_scenario": "near"}, "Prevention: not computed in"),
+        (BARE | {"spectrum": "code.csv", "gap": 0.01}, "A gap wider by 9 cm would keep them"),
+        (BARE | {"station": "", "gap": 0.01}, "A gap wider by 9 cm would have kept them apart."),
+    ],
+)
+def test_none_needed_is_said_only_of_what_was_computed_and_stays_apart(pair, expected):
+    (line,) = (line for line in pair_lines(pair) if line.startswith(expected.split()[0] + " "))
+    assert line.startswith(expected)
+    # Neither of these pairs that need a gap has a record
+    without_record = "Damping and bumpers: not computed without a record." in pair_lines(pair)
+    assert without_record == expected.startswith("A gap")
 
 
 @pytest.mark.parametrize("name", ["<script>alert(1)</script>", "\u202eevil\n", "x" * 10_000])

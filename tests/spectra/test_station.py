@@ -147,6 +147,8 @@ def test_the_stream_is_left_as_it_was():
         (_stream((), vertical=True), "has 0 horizontal and 1 vertical"),
         (_stream((0.0, 45.0, 90.0)), "has 3 horizontal"),
         (_stream(units="counts"), "XX.ONE..HN1 is in 'counts', not m/s2"),
+        # As obspy.read returns it
+        (_stream(units=None), "XX.ONE..HN1 has no stats.units: expected acceleration in m/s2"),
         (_stream((20.0, 30.0)), "too close to the same line"),
         (
             Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1][:-1])]),

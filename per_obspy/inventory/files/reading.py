@@ -184,6 +184,8 @@ class PairInventory:
     ----------
     count : int
         Number of rows.
+    rows : dict of Path to int
+        Number of rows of each file.
     names : set of str
         Columns that all files have.
     suspicions : Suspicions
@@ -200,6 +202,7 @@ class PairInventory:
         self.suspicions = Suspicions()
         self.names = set.intersection(*(set(file.names) for file in self._files.values()))
         # Hashes that occur twice: candidates for repeated identifiers
+        self.rows = dict[Path, int]()
         hashes = self._identifier_hashes()
         self.count = len(hashes)
         distinct, times = np.unique(hashes, return_counts=True)
@@ -212,7 +215,8 @@ class PairInventory:
         for path, file in self._files.items():
             hashes[path] = [name_hashes(block) for block in file.identifiers()]
         for path, blocks in hashes.items():
-            if not sum(map(len, blocks)):
+            self.rows[path] = sum(map(len, blocks))
+            if not self.rows[path]:
                 raise CatalogError(str(path), "the table has no rows")
         return np.concatenate([block for blocks in hashes.values() for block in blocks])
 

@@ -4,14 +4,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from per_obspy import checks
+from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import Rejections
 from per_obspy.inventory.footprints.building_columns import building_columns
 from per_obspy.inventory.footprints.buildings import Buildings, projected, without_repetitions
-from per_obspy.inventory.footprints.footprint_rows import NearBuildings, pair_table
+from per_obspy.inventory.footprints.footprint_rows import NearBuildings, pair_names, pair_table
 from per_obspy.inventory.footprints.layers import read_layer
 from per_obspy.inventory.footprints.neighbours import neighbours
 from per_obspy.inventory.schema import COLUMNS
@@ -31,10 +33,13 @@ class FootprintPairs(NamedTuple):
         As :func:`pairs_from_footprints` returns them.
     buildings : Buildings
         To which pairs refer by ``building_id_1`` and ``building_id_2``.
+    left_out : (n, 2) ndarray
+        Longitude and latitude of the neighbours that are rejected, degrees.
     """
 
     pairs: pd.DataFrame
     buildings: Buildings
+    left_out: FloatArray
 
 
 def pairs_from_footprints(
@@ -112,8 +117,18 @@ def find_footprint_pairs(
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
     found = NearBuildings(near, table, drawn, shapes.central_meridian)
     pairs = pair_table(found, source)
+    middle = _middle(found, pairs.attrs["rejected"])
     pairs.attrs["rejected"] = Rejections(rejected + pairs.attrs["rejected"])
-    return FootprintPairs(pairs, Buildings(buildings.outlines, table))
+    return FootprintPairs(pairs, Buildings(buildings.outlines, table), middle)
+
+
+def _middle(found: NearBuildings, rejected: Sequence[Rejection]) -> FloatArray:
+    """Return longitude and latitude amid both buildings of rejected pairs, degrees."""
+    names = {rejection.name for rejection in rejected}
+    chosen = pair_names(found).isin(names).to_numpy()
+    places = found.buildings[["longitude", "latitude"]].to_numpy()
+    first, second = places[found.near.first[chosen]], places[found.near.second[chosen]]
+    return np.asarray(0.5 * (first + second))
 
 
 def _usable_buildings(

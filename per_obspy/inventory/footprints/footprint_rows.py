@@ -61,7 +61,7 @@ def pair_table(found: NearBuildings, source: str) -> pd.DataFrame:
     """
     columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
     # Repeated names are known of all pairs only
-    names = _pair_names(found)
+    names = pair_names(found)
     repeated = names.duplicated().to_numpy()
     # Blocks bound the memory of the checks
     for start in range(0, len(names), CHUNK):
@@ -91,7 +91,7 @@ def _checked(
     return _with_contact(checked), rejected
 
 
-def _pair_names(found: NearBuildings) -> pd.Series:
+def pair_names(found: NearBuildings) -> pd.Series:
     """Return identifiers of pairs from those of the buildings."""
     identifiers = found.buildings["building_id"]
     first = identifiers.iloc[found.near.first].reset_index(drop=True)

@@ -1,6 +1,6 @@
 """Settings of a run from the arguments of a command: a configuration, or records and pairs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -98,20 +98,44 @@ def run_content(records: str | None, pairs: str | None, output: Path) -> dict[st
     return content
 
 
-def configurations_in(folder: Path) -> list[Path]:
-    """Return the configurations of runs in a folder."""
-    return [path for path, kind in files_in(folder).items() if kind is Kind.CONFIGURATION]
+def named_configuration(argument: Path, kinds: Collection[Kind] = (Kind.CONFIGURATION,)) -> Path:
+    """
+    Return a configuration, or the only one in a folder such as that of earlier results.
+
+    Parameters
+    ----------
+    argument : Path
+        TOML file or folder.
+    kinds : collection of Kind
+        Kinds of configurations that a folder is searched for.
+
+    Raises
+    ------
+    CatalogError
+        If a folder holds none of them, or several.
+    """
+    if not argument.is_dir():
+        return argument
+    if found := _only_configuration(argument, kinds):
+        return found
+    expected = " or ".join(kinds)
+    raise CatalogError(str(argument), f"holds no {expected}: name a TOML file, or a folder of one")
+
+
+def _only_configuration(folder: Path, kinds: Collection[Kind]) -> Path | None:
+    """Return the only configuration in a folder, None if there is none."""
+    found = [path for path, kind in files_in(folder).items() if kind in kinds]
+    if len(found) > 1:
+        names = ", ".join(file.name for file in found)
+        raise CatalogError(str(folder), f"holds several configurations, name one: {names}")
+    return found[0] if found else None
 
 
 def _configuration(argument: str) -> Path | None:
     """Return the configuration that an argument names; None if it names another kind of input."""
     path = Path(argument)
     if path.is_dir():
-        found = configurations_in(path)
-        if len(found) > 1:
-            names = ", ".join(file.name for file in found)
-            raise CatalogError(argument, f"holds several configurations, name one: {names}")
-        return found[0] if found else None
+        return _only_configuration(path, (Kind.CONFIGURATION,))
     if path.is_file():
         return path if kind_of(path) is Kind.CONFIGURATION else None
     # A missing file is reported where it is read

@@ -2,14 +2,18 @@
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from per_obspy.config import Run
+from per_obspy.config import Run, Totals
 from per_obspy.config.pairs import Footprints
 from per_obspy.errors import require_extra
 from per_obspy.files import content_hash, file_hash, remove_file
 from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, write_status
+
+if TYPE_CHECKING:
+    from per_obspy.inventory.footprints.footprint_pairs import FootprintPairs
+    from per_obspy.tables.coverage import Search
 
 #: Table of the pairs, its rejections, and the status file by which they are kept.
 PAIRS, REJECTED, STATUS = "pairs.parquet", "pairs.rejected.csv", "pairs.json"
@@ -69,18 +73,44 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
 
 def _write_found(footprints: Footprints, folder: Path) -> dict[str, int]:
     """Find pairs, write them with their buildings and rejections, and return the numbers."""
-    # A finished run does not wait for these
+    # A finished run does not wait for this
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+
+    found = find_footprint_pairs(footprints.file, **_options(footprints))
+    write_search(found, folder / PAIRS)
+    return dict(zip(COUNTED, (len(found.pairs), len(found.pairs.attrs["rejected"])), strict=True))
+
+
+def write_search(found: "FootprintPairs", path: Path) -> "Search":
+    """
+    Write found pairs, and their buildings and rejections next to them.
+
+    Parameters
+    ----------
+    found : FootprintPairs
+        From a search in footprints.
+    path : Path
+        Pair table, ``.parquet`` or ``.csv``.
+
+    Returns
+    -------
+    Search
+        Account of neighbours and of those that are left out, which a Parquet table holds too.
+    """
     from per_obspy.inventory.files.writing import write_pairs
     from per_obspy.inventory.footprints.buildings import write_buildings
-    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+    from per_obspy.pipeline.losses import cell_names
+    from per_obspy.tables.coverage import as_metadata, search_account
     from per_obspy.tables.table_files import write_rejected
 
-    table, buildings = find_footprint_pairs(footprints.file, **_options(footprints))
-    rejected = table.attrs["rejected"]
-    write_pairs(table, folder / PAIRS)
-    write_buildings(buildings, folder / BUILDINGS)
-    write_rejected(rejected, folder / REJECTED)
-    return dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
+    # What is left out belongs to the cells of a run's totals
+    rejected, places = found.pairs.attrs["rejected"], found.left_out
+    areas = cell_names(places[:, 0], places[:, 1], Totals().cell) if len(places) else []
+    search = search_account(len(found.pairs), rejected, areas)
+    write_pairs(found.pairs, path, as_metadata(search))
+    write_buildings(found.buildings, path.with_suffix(".buildings.parquet"))
+    write_rejected(rejected, path.with_suffix(".rejected.csv"))
+    return search
 
 
 def pair_table(settings: Run, folder: Path) -> Path | None:

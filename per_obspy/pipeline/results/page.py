@@ -34,6 +34,7 @@ from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.summary.statements import event_sentences, station_sentences
 from per_obspy.report.summary.wording import WORDING
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_table import RankedTable
 from per_obspy.tables.totals import areas_of
 
@@ -54,7 +55,7 @@ def write_run_page(
     settings: Run,
     folder: Path,
     stations: Sequence[FinishedStation],
-    found: tuple[PairTally, pd.DataFrame, pd.DataFrame],
+    found: tuple[PairTally, pd.DataFrame, pd.DataFrame, Coverage],
     simulated: bool,
 ) -> None:
     """
@@ -68,12 +69,12 @@ def write_run_page(
         Of the results; its tables of stations, rejections and buildings are read.
     stations : sequence of FinishedStation
         With station files.
-    found : (PairTally, DataFrame, DataFrame)
-        Counts of all pairs, the worst pairs, and totals by area.
+    found : (PairTally, DataFrame, DataFrame, Coverage)
+        Counts of all pairs, the worst pairs, totals by area, and rows that are left out.
     simulated : bool
         Whether the motion is simulated.
     """
-    tally, worst, areas = found
+    tally, worst, areas, coverage = found
     # Files that the stages before have written
     region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
     # Sentences are made of tables, and the map of pairs
@@ -97,6 +98,7 @@ def write_run_page(
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=pair_histories(worst, stations),
         provenance=_provenance(settings),
+        coverage=coverage,
         drawings=page_drawings(settings, worst, stations),
     )
     write_page(data, folder / "report.html")
@@ -134,6 +136,10 @@ class TableSources(NamedTuple):
         Rank -> history of a pair.
     notes : sequence of str
         Sentences on omitted contents, and on those from other sources.
+    kind : str
+        ``design`` or ``ensemble``.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     """
 
     region: Region
@@ -144,6 +150,8 @@ class TableSources(NamedTuple):
     outlines: Path | None
     histories: Mapping[int, dict[str, Any]]
     notes: Sequence[str]
+    kind: str
+    coverage: Coverage
 
 
 def write_table_page(
@@ -187,6 +195,8 @@ def write_table_page(
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=sources.histories,
         provenance=[*_made(sources.language), *_content(sources.notes, sources.language)],
+        coverage=sources.coverage,
+        kind=sources.kind,
     )
     write_page(data, folder / "report.html")
 

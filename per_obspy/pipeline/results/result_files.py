@@ -22,6 +22,7 @@ from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
 from per_obspy.screening.columns import column_table, known_column
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_files import table_name
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 
@@ -40,6 +41,8 @@ class Screening(NamedTuple):
         Title, classes, stations and epicentre.
     source : list of str
         Sentences on the earthquake, spectrum or scenarios.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     spreadsheet : bool
         Whether a workbook is written.
     language : Language
@@ -56,6 +59,7 @@ class Screening(NamedTuple):
     stem: str
     region: Region
     source: list[str]
+    coverage: Coverage
     spreadsheet: bool = False
     language: Language = "en"
     own: Sequence[str] = ()
@@ -119,6 +123,7 @@ def _facts(
         screening.stations,
         area,
         made,
+        screening.coverage,
         screening.language,
     )
 

@@ -25,6 +25,7 @@ from per_obspy.screening.by_spectrum.design_table import DESIGN
 from per_obspy.screening.ranking import pounding_state, risk_class
 from per_obspy.screening.region.ensemble import ensemble_columns
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.totals import (
     CountedTotals,
     areas_of,
@@ -62,6 +63,8 @@ class _Asked(NamedTuple):
         Sentences on contents that the page omits.
     own : sequence of str
         Columns that are computed, besides those of a risk table.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     stations : DataFrame
         Of all scenarios; empty for a spectrum.
     histories : callable
@@ -77,6 +80,7 @@ class _Asked(NamedTuple):
     outlines: Path | None
     notes: list[str]
     own: Sequence[str]
+    coverage: Coverage
     stations: pd.DataFrame = pd.DataFrame()
     histories: Callable[[pd.DataFrame], Mapping[int, dict[str, Any]]] | None = None
 
@@ -90,7 +94,9 @@ class _Noted(NamedTuple):
     totals: CountedTotals
 
 
-def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report:
+def report_design(
+    settings: Design, table: pd.DataFrame, coverage: Coverage, folder: Path
+) -> Report:
     """
     Write page, summary, totals, overview, KML, layers and workbook of a design spectrum.
 
@@ -100,6 +106,8 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
         Settings of the screening.
     table : DataFrame
         From :func:`per_obspy.screening.by_spectrum.design_table.design_table`.
+    coverage : Coverage
+        Rows of the pair table, and those that are left out.
     folder : Path
         Of the results.
 
@@ -127,6 +135,7 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
         outlines_beside(settings.pairs),
         [texts["page_design"]],
         list(DESIGN),
+        coverage,
     )
     _write(asked, iter([_with_flags(table)]), len(table), report)
     return report
@@ -140,7 +149,7 @@ def _with_flags(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def report_ensemble(
-    settings: Ensemble, folder: Path, simulated: bool, pairs: int, runs: ScenarioRuns
+    settings: Ensemble, folder: Path, simulated: bool, coverage: Coverage, runs: ScenarioRuns
 ) -> Report:
     """
     Write page, summary, totals, overview, KML, layers and workbook of an ensemble.
@@ -155,13 +164,13 @@ def report_ensemble(
         With ``ensemble.parquet``.
     simulated : bool
         Whether the motion of a scenario is simulated.
-    pairs : int
-        Number of pairs.
+    coverage : Coverage
+        Rows of the pair tables, and those that have a probability in every scenario.
     runs : ScenarioRuns
         Runs of the scenarios, which know buildings, stations and records.
     """
     report = Report([], [])
-    if not pairs:
+    if not coverage.screened:
         return report
     # The scenarios replace the earthquake
     limits, texts = ScreeningSettings(), WORDING[settings.report.language]
@@ -175,11 +184,12 @@ def report_ensemble(
         runs.outlines(),
         [texts["page_ensemble"]],
         list(ensemble_columns(settings.weights, settings.yearly)),
+        coverage,
         runs.stations(),
         runs.histories,
     )
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(folder / "ensemble.parquet"))
-    _write(asked, pieces, pairs, report)
+    _write(asked, pieces, coverage.screened, report)
     return report
 
 
@@ -244,6 +254,7 @@ def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Repo
         asked.stem,
         region,
         asked.source,
+        asked.coverage,
         asked.settings.spreadsheet,
         language,
         asked.own,
@@ -262,6 +273,8 @@ def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Repo
             asked.outlines,
             histories,
             asked.notes,
+            asked.stem,
+            asked.coverage,
         )
         write_table_page(folder, sources, found.notes.tally, worst)
     # The map of all pairs

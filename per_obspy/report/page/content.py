@@ -2,19 +2,28 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import pandas as pd
 
 from per_obspy.errors import shortened
+from per_obspy.report.coverage import coverage_number, coverage_sentences
 from per_obspy.report.page.export_columns import addresses, pack_export, text_kind
 from per_obspy.report.page.first_screen import Event, PageBuildings, first_screen
-from per_obspy.report.page.packing import LONGEST_TEXT, PackedTable, pack_table
+from per_obspy.report.page.packing import (
+    FRACTION_BITS,
+    LONGEST_TEXT,
+    PackedTable,
+    pack_table,
+)
 from per_obspy.report.page.tally import PairTally
-from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases
+from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases, written
 from per_obspy.report.style import BUILDING_COLOURS, class_colours
+from per_obspy.report.words import missing_gap, prevention_kind
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.tables.coverage import Coverage
 
 #: Columns of a pair on the page, and their kinds.
 PAIR_KINDS = {
@@ -32,8 +41,11 @@ PAIR_KINDS = {
     "participation_1": "number", "participation_2": "number", "per_1": "number",
     "per_2": "number", "sd_1": "number", "sd_2": "number", "period_log_std_1": "number",
     "period_log_std_2": "number", "supplemental_damping": "number",
-    "bumper_restitution": "number",
+    "bumper_restitution": "number", "prevention_kind": "choice", "worst_scenario": "choice",
 }  # fmt: skip
+
+#: Largest and smallest probability below 1 and above 0 that single precision keeps apart from them.
+NEARLY_NEVER, NEARLY_SURE = 1e-30, 1.0 - 2.0**-FRACTION_BITS
 
 #: Kinds of texts that the script never shows by their keys.
 HIDDEN = ("flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_")
@@ -119,10 +131,14 @@ class PageData(NamedTuple):
         ``coast`` and ``borders``, lines of longitude and latitude by turns.
     histories : mapping of int to dict
         Rank -> history of a pair for a drawing.
-    drawings : PageDrawings
-        Stations and sensitivities for drawings.
     provenance : sequence of (str, str)
         Where the results come from.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
+    drawings : PageDrawings
+        Stations and sensitivities for drawings.
+    kind : str
+        ``run``, ``design`` or ``ensemble``, which differ in some texts.
     """
 
     title: str
@@ -141,7 +157,9 @@ class PageData(NamedTuple):
     lines: Mapping[str, list[list[float]]]
     histories: Mapping[int, dict[str, Any]]
     provenance: Sequence[tuple[str, str]]
+    coverage: Coverage
     drawings: PageDrawings = NO_DRAWINGS
+    kind: str = "run"
 
 
 def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
@@ -151,14 +169,18 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
     # Tables of which it names rows
     found = data.areas, data.stations
     screen = first_screen(data.event, data.tally, data.worst, found, data.buildings, facts)
+    # What has a verdict, of all that should have one, is the first number
+    screen.numbers.insert(0, _pairs_screened(data))
     texts, tables = LANGUAGES[data.language], _tables(data)
     content = {
         "language": data.language,
-        "texts": {key: text for key, text in texts.items() if not key.startswith(HIDDEN)},
+        "texts": _texts(texts, data.kind),
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
         "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
         "title": shortened(data.title, LONGEST_CELL),
         "simulated": data.simulated,
+        "coverage": coverage_sentences(data.coverage, data.language),
+        "warns": data.coverage.lacks_many,
         **screen._asdict(),
         "states": _states(data.tally, texts),
         "classes": _classes(data, texts),
@@ -168,6 +190,20 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
         "tables": [table.description for table in tables],
     }
     return content, tables
+
+
+def _pairs_screened(data: PageData) -> tuple[str, str]:
+    """Return the number of pairs with a verdict, and its meaning."""
+    whole = partial(written, digits=0, language=data.language)
+    return coverage_number(data.coverage, data.language, whole)
+
+
+def _texts(texts: Mapping[str, str], kind: str) -> dict[str, str]:
+    """Return the texts of the script; those of this kind of page replace the general ones."""
+    shown = {key: text for key, text in texts.items() if not key.startswith(HIDDEN)}
+    ending = f"_{kind}"
+    own = {key.removesuffix(ending): shown[key] for key in shown if key.endswith(ending)}
+    return shown | own
 
 
 def _drawn(data: PageData) -> dict[str, Any]:
@@ -195,14 +231,31 @@ def _tables(data: PageData) -> list[PackedTable]:
     kinds = dict.fromkeys(("longitude", "latitude"), "place")
     kinds |= {str(name): "whole" for name in cells if name not in kinds}
     # Places of the inventory by name, for the search
-    address = addresses(data.worst)
-    pairs = data.worst if address is None else data.worst.assign(address=address)
+    address, pairs = addresses(data.worst), _with_measures(data.worst)
+    if address is not None:
+        pairs = pairs.assign(address=address)
     return [
         pack_table(pairs, PAIR_KINDS | {"address": text_kind(pairs, "address")}),
         pack_table(cells, kinds),
         pack_table(_buildings(data), BUILDING_KINDS),
         pack_export(data.worst, PAIR_KINDS),
     ]
+
+
+def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
+    """Return pairs with the case of their measures, and probabilities that stay below 1."""
+    names = ("gap", "demand", "missing_gap", "state", "risk_class")
+    known = worst[[name for name in names if name in worst]].to_dict("records")
+    pairs = worst.assign(prevention_kind=[prevention_kind(pair) for pair in known])
+    if "demand" in worst:
+        pairs = pairs.assign(missing_gap=[missing_gap(pair) for pair in known])
+    if "probability" not in pairs:
+        return pairs
+    # Neither 0 nor 1 may come of the packing
+    chance = pairs["probability"]
+    open_chance = (chance > 0.0) & (chance < 1.0)
+    kept = chance.clip(NEARLY_NEVER, NEARLY_SURE).where(open_chance, chance)
+    return pairs.assign(probability=kept)
 
 
 def _buildings(data: PageData) -> pd.DataFrame:
@@ -248,6 +301,9 @@ def _further_tables(data: PageData, texts: Mapping[str, str]) -> dict[str, Any]:
         shown = min(data.rejections, MOST_ROWS)
         key = "rejected_some_one" if data.rejections == 1 else "rejected_some"
         note = texts[key].format(shown=shown, all=data.rejections)
+    elif data.coverage.pairs > data.coverage.screened:
+        # What the search for pairs left out is in no table of this run
+        note = " ".join(coverage_sentences(data.coverage, data.language))
     # Stations are on the map too
     stations = _rows(_described(data.stations, data.language), STATION_COLUMNS, texts)
     return {

@@ -238,11 +238,11 @@ def _place_texts(event: Event, language: Language) -> list[str]:
 def _numbers(
     tally: PairTally, worst: pd.DataFrame, buildings: PageBuildings | None, language: Language
 ) -> list[tuple[str, str]]:
-    """Return the five numbers: pairs, pounding, expected or buildings, worst class, velocity."""
-    # Five numbers that a decision needs, the last one in a unit
+    """Return numbers after that of the pairs: pounding, expected or buildings, class, velocity."""
+    # Numbers that a decision needs, the last one in a unit
     texts = LANGUAGES[language]
     sure = tally.states["yes"] + tally.states["likely"]
-    numbers = [(float(tally.pairs), "number_pairs"), (float(sure), "number_pounding")]
+    numbers = [(float(sure), "number_pounding")]
     if buildings is not None and buildings.hit is not None:
         numbers.append((float(buildings.hit), "number_buildings"))
     else:

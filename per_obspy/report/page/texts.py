@@ -5,7 +5,7 @@ from typing import Literal
 
 from per_obspy.report.page.languages.phrases import in_spanish
 from per_obspy.report.page.languages.spanish import SPANISH
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.columns import DEMAND_RULES, FLAGS
 
 Language = Literal["en", "es"]
 
@@ -16,8 +16,6 @@ ENGLISH: dict[str, str] = {
     "summary": "summary",
     "do_first": "What to do first",
     "how_sure": "How sure this is",
-    "number_pairs": "pairs screened",
-    "number_pairs_one": "pair screened",
     "number_pounding": "pairs hit each other, surely or likely",
     "number_pounding_one": "pair surely or likely hits",
     "number_expected": "pairs expected to hit each other",
@@ -47,7 +45,7 @@ ENGLISH: dict[str, str] = {
     "todo_unknown_one": "Measure {count} gap that is unknown: there is no verdict without it.",
     "todo_possible_one": "Then look at the {count} pair that possibly, not likely, hits.",
     "todo_possible": "Then look at the {count} pairs that possibly, not likely, hit each other.",
-    "todo_none": "No pair is likely to have hit its neighbour; check the possible ones.",
+    "todo_none": "No pair is likely to hit its neighbour; check the possible ones.",
     "sure_expected": (
         "{mean} pairs are expected to pound; the standard deviation lies between {low} "
         "(independent pairs) and {high} (one cause for all)."
@@ -140,10 +138,15 @@ ENGLISH: dict[str, str] = {
     "building": "Building",
     "close": "close",
     "says_probability": "The probability of pounding in this event is {value} %.",
+    "says_probability_design": "The probability of pounding under this spectrum is {value} %.",
+    "says_probability_ensemble": (
+        "The probability of pounding, if one of the scenarios happens, is {value} %."
+    ),
     "says_velocity": (
         "The buildings are expected to meet at {value} cm/s; in 84 of 100 outcomes it is at most "
         "{high} cm/s."
     ),
+    "says_velocity_alone": "The buildings are expected to meet at {value} cm/s.",
     "says_touching": "The buildings touch: the gap is 0 cm.",
     "says_gap": "The gap is {value} cm.",
     "says_no_gap": "The gap is unknown.",
@@ -153,12 +156,8 @@ ENGLISH: dict[str, str] = {
     "says_amplification": "Pounding multiplies the motion of one of them by {value}.",
     "says_address": "Place: {value}.",
     "says_station": "Record of station {station}, {value} km away.",
-    "rule_exact": "exact for the record",
-    "rule_per_white_noise": "estimate from PER",
-    "rule_per_record": "estimate from PER and the record's correlation",
-    "rule_linearized": "estimate for yielding buildings",
-    "rule_srss": "SRSS, because a period is derived",
-    "rule_shakemap": "from a ShakeMap",
+    **{f"rule_{name}": words for name, words in DEMAND_RULES.items()},
+    "rule_": "rule unknown",
     "both_buildings": "Both buildings",
     "fact_building_id": "building",
     "fact_height": "height, m",
@@ -190,13 +189,31 @@ ENGLISH: dict[str, str] = {
         "For this pair, in the folder of the results: {command}"
     ),
     "prevention": "What would have prevented it",
+    "prevention_design": "What would prevent it",
+    "prevention_ensemble": "What would prevent it",
     "prevents_gap": "{value} cm more gap, {whole} cm in all.",
     "prevents_damping": "{value} % of critical damping added to both buildings.",
     "prevents_no_damping": "Damping alone does not: 40 % of critical added is too little.",
     "prevents_bumper": (
         "Bumpers do not prevent it but soften it: restitution at most {value} (estimate)."
     ),
-    "prevents_nothing": "No measure is needed in this event.",
+    "prevents_without_record": "Damping and bumpers: not computed without a record.",
+    "prevents_unknown_gap": ("The gap is unknown: measure it first. The gap needed is {whole} cm."),
+    "prevents_unknown_gap_ensemble": "The gap is unknown: measure it first.",
+    "prevents_not_computed": "Not computed for this pair.",
+    "prevents_not_computed_ensemble": (
+        "Not computed for several scenarios together: see the results of the worst one, {name}."
+    ),
+    "prevents_in_doubt": (
+        "The gap of {gap} cm is enough for the likeliest inputs, which need {whole} cm. The "
+        "probability counts other values of the inputs, at which it is not."
+    ),
+    "prevents_nothing": (
+        "None needed in this event: the gap is {gap} cm, the gap needed {whole} cm."
+    ),
+    "prevents_nothing_design": (
+        "None needed under this spectrum: the gap is {gap} cm, the gap needed {whole} cm."
+    ),
     "flags": "Flags",
     "derived": "Derived inputs",
     "derived_spread": (

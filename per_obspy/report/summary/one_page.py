@@ -11,6 +11,7 @@ from matplotlib.text import Text
 
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.overview import draw_map
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
 from per_obspy.report.summary.statements import (
@@ -26,10 +27,16 @@ from per_obspy.report.words import chance_text, length_text, number, speed_text
 #: A4, inches; margins and lines as shares of the page.
 PAGE = (8.27, 11.69)
 LEFT, RIGHT = 0.07, 0.93
-LINE = 0.0148
+LINE, LEGEND_LINE = 0.0148, 0.013
+
+#: Left edge of the map and its legend.
+MAP_LEFT = 0.56
 
 #: Characters of a line of text of size 9 across half a page, and across the page.
 HALF, WHOLE = 52, 108
+
+#: Characters of the longest sentence on what is left out; summary.txt has all of it.
+LONGEST_ACCOUNT = 300
 
 #: Colour of the warning that motion is simulated.
 WARNING_COLOUR = "#AA0000"
@@ -72,7 +79,9 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
 
 def _draw_map(figure: Figure, facts: SummaryFacts, shown: pd.DataFrame, bottom: float) -> None:
     """Draw the map of the pairs on the right, with its legend."""
-    axes, texts = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225)), facts.texts
+    legend = _write_legend(figure, facts, bottom + 0.005)
+    box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
+    axes, texts = figure.add_axes(box), facts.texts
     draw_map(axes, shown, facts.region, around_pairs=True)
     # Labels in the language of the summary
     axes.set_title(texts["map_title"].format(count=len(shown)))
@@ -80,7 +89,6 @@ def _draw_map(figure: Figure, facts: SummaryFacts, shown: pd.DataFrame, bottom: 
     axes.tick_params(labelsize=7)
     for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
         text.set_fontsize(8)
-    _write_legend(figure, facts, bottom + 0.005)
 
 
 def _write_head(figure: Figure, facts: SummaryFacts) -> float:
@@ -94,6 +102,11 @@ def _write_head(figure: Figure, facts: SummaryFacts) -> float:
             LEFT, at, facts.texts["simulated"], fontsize=12, color=WARNING_COLOUR, fontweight="bold"
         )
         at -= 0.022
+    # Whatever has no verdict comes first
+    for place, sentence in enumerate(coverage_sentences(facts.coverage, facts.language)):
+        warns = place == 0 and facts.coverage.lacks_many
+        lines = wrap(shortened(sentence, LONGEST_ACCOUNT), WHOLE)
+        at = _write_lines(figure, lines, at, WARNING_COLOUR if warns else "black")
     # Sentences one after the other
     stations = station_sentences(facts.stations, facts.language)
     for text in (" ".join(facts.source), " ".join(stations)):
@@ -101,10 +114,10 @@ def _write_head(figure: Figure, facts: SummaryFacts) -> float:
     return at - 0.01
 
 
-def _write_lines(figure: Figure, lines: list[str], at: float) -> float:
+def _write_lines(figure: Figure, lines: list[str], at: float, colour: str = "black") -> float:
     """Write lines of text and return how far the page is filled."""
     for line in lines:
-        figure.text(LEFT, at, literal(line), fontsize=9)
+        figure.text(LEFT, at, literal(line), fontsize=9, color=colour)
         at -= LINE
     return at
 
@@ -133,16 +146,26 @@ def _write_section(
     return at - 0.012
 
 
-def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> None:
-    """Write the number of pairs of each class in its colour below the map."""
-    # As far apart as their texts are long
-    left = 0.56
+def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> float:
+    """Write the number of pairs of each class in its colour, and return the height of the lines."""
+    # Entries as wide as they are drawn, on as many lines as they need between map and margin
+    left, line = MAP_LEFT, 0
+    entries = list[tuple[Text, Text, int]]()
     for name, colour in class_colours(facts.region.classes).items():
         if count := facts.counts.classes.get(name, 0):
-            text = f"{shortened(name, 14)} {count}"
-            figure.text(left, at, "●", fontsize=9, color=colour)
-            figure.text(left + 0.016, at, literal(text), fontsize=7.5)
-            left += 0.034 + 0.0075 * len(text)
+            words = literal(f"{shortened(name, 24)} {count}")
+            text = figure.text(0.0, 0.0, words, fontsize=7.5)
+            width = 0.016 + text.get_window_extent().width / figure.bbox.width
+            if left > MAP_LEFT and left + width > RIGHT:
+                left, line = MAP_LEFT, line + 1
+            entries.append((figure.text(left, 0.0, "●", fontsize=9, color=colour), text, line))
+            text.set_x(left + 0.016)
+            left += width + 0.018
+    # The last line is the lowest
+    for *drawn, row in entries:
+        for text in drawn:
+            text.set_y(at + LEGEND_LINE * (line - row))
+    return LEGEND_LINE * line
 
 
 def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:

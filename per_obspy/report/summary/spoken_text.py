@@ -6,6 +6,7 @@ from textwrap import wrap
 from unicodedata import normalize
 
 from per_obspy.files import written_whole
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.page.texts import Language
 from per_obspy.report.summary.statements import (
     SummaryFacts,
@@ -26,12 +27,10 @@ _UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/-]")
 #: Symbols with a word, by language.
 _WORDS: dict[Language, dict[str, str]] = {
     "en": {
-        "cm/s": "cm per second", "%": " percent", "°": " degrees", "&": " and ",
-        "_": " underscore ", "+": " plus ",
+        "cm/s": "cm per second", "%": " percent", "°": " degrees", "&": " and ", "+": " plus ",
     },
     "es": {
-        "cm/s": "cm por segundo", "%": " por ciento", "°": " grados", "&": " y ",
-        "_": " guion bajo ", "+": " mas ",
+        "cm/s": "cm por segundo", "%": " por ciento", "°": " grados", "&": " y ", "+": " mas ",
     },
 }  # fmt: skip
 
@@ -43,7 +42,7 @@ def spoken(text: str, language: Language = "en") -> str:
     Examples
     --------
     >>> spoken("Añasco_1 <script>"), spoken("84 %")
-    ('Anasco underscore 1 script', '84 percent')
+    ('Anasco 1 script', '84 percent')
     """
     for symbol, word in _WORDS[language].items():
         text = text.replace(symbol, word)
@@ -65,10 +64,14 @@ def summary_lines(facts: SummaryFacts) -> list[str]:
 def _sections(facts: SummaryFacts) -> dict[str, list[str]]:
     """Return the sentences of each section by its title; the first title is empty."""
     texts, language = facts.texts, facts.language
-    simulated = [texts["simulated_spoken"]] if facts.region.simulated else []
+    # Whatever has no verdict comes before the earthquake, and before the title if it is much
+    account = coverage_sentences(facts.coverage, language)
+    warned = int(facts.coverage.lacks_many)
     head = [
+        *account[:warned],
         facts.region.title[:200],
-        *simulated,
+        *([texts["simulated_spoken"]] if facts.region.simulated else []),
+        *account[warned:],
         *facts.source,
         *station_sentences(facts.stations, language),
     ]

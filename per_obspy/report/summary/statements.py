@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from per_obspy.report.coverage import coverage_number
 from per_obspy.report.overview import Region
 from per_obspy.report.page.texts import Language
 from per_obspy.report.summary.wording import WORDING, in_language
 from per_obspy.report.words import chance_text, name_text, number, speed_text
+from per_obspy.tables.coverage import Coverage
 
 #: Pairs and buildings that the summary lists.
 LISTED = 10
@@ -66,6 +68,8 @@ class SummaryFacts(NamedTuple):
         Name and place of the area with most expected pounding; empty if there are no areas.
     made : str
         When and with which version the results were made.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
     language : Language
         Of its sentences.
     """
@@ -78,6 +82,7 @@ class SummaryFacts(NamedTuple):
     stations: pd.DataFrame
     area: str
     made: str
+    coverage: Coverage
     language: Language = "en"
 
     @property
@@ -137,7 +142,7 @@ def five_numbers(facts: SummaryFacts) -> list[tuple[str, str]]:
     # Of all pairs the worst ones are the fastest
     fastest = facts.worst["expected_impact_velocity"].max() if len(facts.worst) else math.nan
     return [
-        (str(counts.pairs), texts["number_pairs"]),
+        coverage_number(facts.coverage, facts.language),
         (str(pounding), texts["number_pounding"]),
         (f"{counts.expected:.0f}", texts["number_expected"]),
         (str(counts.classes.get(first, 0)), texts["number_class"].format(name=name_text(first))),

@@ -37,7 +37,6 @@ ENGLISH: dict[str, str] = {
     "how_sure": "How sure",
     "made_by": "Source",
     # Five numbers
-    "number_pairs": "pairs of buildings screened",
     "number_pounding": "pairs that pound or are likely to",
     "number_expected": "pairs expected to pound in all",
     "number_class": "pairs of the worst class, {name}",
@@ -115,7 +114,6 @@ SPANISH: dict[str, str] = {
     "worst_buildings": "Los peores edificios",
     "how_sure": "Qué tan seguro es",
     "made_by": "Fuente",
-    "number_pairs": "pares de edificios evaluados",
     "number_pounding": "pares que chocan o probablemente chocan",
     "number_expected": "choques esperados en total",
     "number_class": "pares de la peor clase, {name}",

@@ -14,7 +14,7 @@ from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.values import values
 
 #: Texts of a building without need of a measure, and of one that needs them in other gaps.
-NOTHING = "no measure: its gaps are enough in this record"
+NOTHING = "no measure for the likeliest inputs: its gaps are enough"
 ELSEWHERE = "wider gaps elsewhere in its row: its own are enough for each pair alone"
 
 #: Text of a building with a gap that is not known.

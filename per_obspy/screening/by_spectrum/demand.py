@@ -132,6 +132,7 @@ def spectral_columns(
         "absolute_gap_sd": absolute_gap(*demand.radii),
         "demand": demand.demand,
         "demand_ratio": demand_ratio(gap, demand.demand),
+        "missing_gap": np.maximum(demand.demand - gap, 0.0),
         **population,
         "state": pounding_state(population["probability"], screening.states),
         "risk_class": risk_class(population["expected_impact_velocity"], screening.classes),

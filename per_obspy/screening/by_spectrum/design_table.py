@@ -74,6 +74,7 @@ LEADING = (
     "demand",
     "demand_rule",
     "demand_ratio",
+    "missing_gap",
     "impact_velocity",
     "single_hit_status",
     "amplification_1",

@@ -138,8 +138,7 @@ def _rows(
     # columns of a risk table with those of SD
     named = pairs.assign(demand_rule="shakemap")
     table = spectral_columns(named, (sd_1, sd_2), demand, population, screening)
-    missing = np.maximum(demand.demand - values(pairs, "gap"), 0.0)
-    table = table.assign(flags=_flags(shakemap, table), missing_gap=missing)
+    table = table.assign(flags=_flags(shakemap, table))
     empty = {name: _empty(name) for name in ORDER if name not in table and name != "rank"}
     return table.assign(**empty).drop(
         columns=["srss_gap_sd", "absolute_gap_sd", ODD], errors="ignore"

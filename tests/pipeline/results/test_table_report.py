@@ -27,6 +27,7 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_table import ranked_table
 from per_obspy.tables.totals import piece_totals
 
@@ -80,7 +81,7 @@ def test_every_screening_has_everything(done, stem):
     assert names <= {file.name for file in folder.iterdir()}
     assert (folder / "figures" / "overview.png").exists()
     text = (folder / "summary.txt").read_text()
-    assert "4 pairs of buildings screened." in text
+    assert "4 pairs screened, all of the table." in text
     # simulated motion is never taken for an earthquake
     assert ("SIMULATED" in text) == (stem != "design")
     assert pyogrio.read_info(folder / f"{stem}.gpkg", layer="pairs")["features"] == 4
@@ -120,6 +121,25 @@ def test_the_page_of_a_spectrum_says_what_it_leaves_out(done):
     assert "areas" in dict(pyogrio.list_layers(done["design"] / "design.gpkg"))
 
 
+def test_every_pair_of_a_spectrum_knows_the_gap_it_lacks(done):
+    """Catch a page that says of every pair of a spectrum that it needs no measure."""
+    table = pd.read_parquet(done["design"] / "design.parquet")
+    assert (table["missing_gap"] == (table["demand"] - table["gap"]).clip(lower=0.0)).all()
+    content = page_content(done["design"] / "report.html")
+    kinds = {column["name"]: column.get("texts") for column in content["tables"][0]["columns"]}
+    assert set(kinds["prevention_kind"]) <= {"gap", "in_doubt", "nothing"}
+    assert ("gap" in kinds["prevention_kind"]) == (table["missing_gap"] > 0).any()
+    assert "event" not in content["texts"]["says_probability"]
+    assert "event" not in content["texts"]["prevents_nothing"]
+
+
+def test_an_ensemble_computes_no_measure_and_says_so(done):
+    content = page_content(done["ensemble"] / "report.html")
+    kinds = {column["name"]: column.get("texts") for column in content["tables"][0]["columns"]}
+    assert kinds["prevention_kind"] == ["not_computed"]
+    assert kinds["worst_scenario"] == ["one"]
+
+
 @pytest.mark.parametrize("stem", ["design", "ensemble"])
 def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
     configuration = done[stem].parent / f"{stem}.toml"
@@ -128,7 +148,7 @@ def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
     content = page_content(tmp_path / "es" / "report.html")
     assert content["texts"]["close"] == "cerrar"
     text = (tmp_path / "es" / "summary.txt").read_text()
-    assert "4 pares de edificios evaluados." in text
+    assert "4 pares evaluados, todos los de la tabla." in text
     assert not re.search(r"\b(the|pairs|with|of)\b", text.split("\n\n", 1)[1])
 
 
@@ -219,7 +239,9 @@ def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
     notes = Notes(CLASSES)
     notes.add(table)
     report, region = Report([], []), Region("x", list(CLASSES), False, NOWHERE)
-    write_results(Screening(tmp_path, "risk", region, [], True), notes, table, report)
+    write_results(
+        Screening(tmp_path, "risk", region, [], Coverage(5, 5), True), notes, table, report
+    )
     assert report.faults == []
     kml = (tmp_path / "risk.kml").read_text()
     assert "The worst 2 of 5 pairs; all of them are in risk.parquet." in kml

@@ -6,6 +6,7 @@ import pandas as pd
 from per_obspy.report.page.content import PageData
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.tables.coverage import Coverage
 
 CLASSES = ("severe", "high", "moderate", "low")
 STATES = ("yes", "likely", "possible", "no")
@@ -114,5 +115,6 @@ def page_data(table, language="en", **changes):
         histories={1: {"time": [0.0, 1.0], "one": [-5.0, 5.0], "two": [-9.0, 9.0],
                        "impacts": [[0.4, 0.7]]}},
         provenance=[("made with", "per_obspy")],
+        coverage=Coverage(len(table), len(table)),
     )  # fmt: skip
     return data._replace(**changes)

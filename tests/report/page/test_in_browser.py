@@ -10,6 +10,7 @@ import math
 import re
 from itertools import pairwise
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -477,6 +478,92 @@ def test_spanish(opened):
     english = re.compile(r"\b(the|of|with|and|is|severe|moderate|high|low)\b")
     words = page.page.inner_text("main").replace("made with", "")
     assert english.findall(words) == []
+
+
+def measures(kind):
+    """Return four pairs of one kind of page: to be mended, enough, in doubt, and of unknown gap."""
+    table = pair_table(4).assign(
+        state=["yes", "no", "possible", "unknown"],
+        gap=[0.010, 0.300, 0.120, np.nan],
+        demand=[0.347, 0.100, 0.080, 0.337],
+        missing_gap=[0.337, 0.0, 0.0, np.nan],
+        probability=[1.0, 1e-48, 0.3, np.nan],
+        # What a run has for a pair that stays apart
+        bumper_restitution=[0.4, 1.0, 1.0, np.nan],
+        supplemental_damping=[np.nan, 0.0, 0.0, np.nan],
+        risk_class=["severe", "low", "low", "gap unknown"],
+    )
+    of_record = ["supplemental_damping", "bumper_restitution", "impacts", "impact_velocity_exact"]
+    if kind == "run":
+        return table
+    if kind == "shakemap":
+        empty = dict.fromkeys(of_record, np.nan)
+        return table.assign(station="", distance=np.nan, demand_rule="shakemap", **empty)
+    if kind == "design":
+        return table.assign(demand_rule="sd_srss").drop(columns=["station", "distance", *of_record])
+    own = [
+        "impact_velocity_84",
+        "demand",
+        "demand_rule",
+        "missing_gap",
+        "station",
+        "distance",
+        *of_record,
+    ]
+    return table.drop(columns=own).assign(worst_scenario="near fault")
+
+
+#: Beginning of the sentences on the four pairs of each kind of page.
+MEASURES = {
+    "run": ["33.7 cm more gap, 34.7 cm in all", "None needed in this event: the gap is 30.0 cm",
+            "The gap of 12.0 cm is enough for the likeliest", "The gap is unknown: measure it"],
+    "shakemap": ["33.7 cm more gap, 34.7 cm in all", "None needed in this event",
+                 "The gap of 12.0 cm is enough for the likeliest", "The gap is unknown"],
+    "design": ["33.7 cm more gap, 34.7 cm in all", "None needed under this spectrum: the gap is 30",
+               "The gap of 12.0 cm is enough for the likeliest", "The gap is unknown"],
+    "ensemble": [*["Not computed for several scenarios together: see the results of the worst "
+                   "one, near fault"] * 3, "The gap is unknown"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("language", ["en", "es"])
+@pytest.mark.parametrize("kind", MEASURES)
+def test_none_needed_is_not_said_of_what_is_unknown_or_not_computed(opened, kind, language):
+    """Catch a page that calls every pair of a spectrum, or of unknown gap, safe as it is."""
+    page_kind = "run" if kind == "shakemap" else kind
+    event = Event("", "", math.nan, None, 0, 0, "A spectrum or a map.")
+    page = opened(page_data(measures(kind), language, kind=page_kind, histories={}, event=event))
+    details = []
+    for row in range(1, 5):
+        page.page.click(f"#pairs tbody tr:nth-child({row}) button")
+        details.append(page.page.inner_text("#detail"))
+    english = ("in this event", "No measure", "None needed")
+    spanish = ("no hace falta nada", "desconocida: mídala", "en este evento")
+    for text, expected in zip(details, MEASURES[kind], strict=True):
+        assert not re.search(r"rule_|prevents_|undefined|NaN| – cm", text)
+        if language == "en":
+            assert expected in text
+            assert english[0] not in text or kind in ("run", "shakemap")
+        else:
+            assert not any(words in text for words in english)
+    if language == "es":
+        needs_none = [spanish[0] in text for text in details]
+        assert needs_none == [False, kind != "ensemble", False, False]
+        assert [spanish[1] in text for text in details] == [False, False, False, True]
+        if kind in ("design", "ensemble"):
+            assert not any(spanish[2] in text for text in details)
+    # A pair of a record that stays apart needs no bumper of any kind
+    assert "1.00 (" not in details[1]
+    without_record = "without a record" in details[0] or "sin registro" in details[0]
+    assert without_record == (kind in ("shakemap", "design"))
+
+
+def test_a_small_probability_is_neither_zero_nor_fifty_decimals(opened):
+    place = {"longitude": 13.1, "latitude": 43.1}
+    tiny = pd.DataFrame({"area": ["a", "b"], "expected_pounding": [1e-48, 2.0], **place})
+    page = opened(page_data(measures("run"), areas=tiny))
+    assert page.column(5) == ["100", "< 0.1", "30", "–"]
+    assert page.texts("#areas tbody td:nth-child(2)") == ["2", "< 0.001"]
 
 
 def test_rest_of_the_page(opened):

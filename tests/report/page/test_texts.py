@@ -11,7 +11,7 @@ from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.report.page.languages.spanish import SPANISH
 from per_obspy.report.page.texts import ENGLISH, LANGUAGES, counted
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.columns import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
@@ -29,6 +29,7 @@ def test_every_flag_and_state_has_a_text():
     for texts in LANGUAGES.values():
         assert {f"flag_{name}" for name in FLAGS} <= set(texts)
         assert {f"flagname_{name}" for name in FLAGS} <= set(texts)
+        assert {f"rule_{name}" for name in ("", *DEMAND_RULES)} <= set(texts)
         assert {f"class_{name}" for name in [*Screening().classes, UNKNOWN_CLASS]} <= set(texts)
         assert {f"state_{name}" for name in EVERY_STATE} <= set(texts)
 

@@ -6,6 +6,7 @@ per_obspy.report.summary.one_page too.
 """
 
 import re
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,9 @@ from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
 from per_obspy.report.summary.statements import Counts, SummaryFacts, event_sentences
 from per_obspy.report.summary.wording import ENGLISH, SPANISH
+from per_obspy.tables.coverage import Coverage, Search
+
+COVERAGE = Coverage(20, 16, {"no station within reach": 4})
 
 HOSTILE = ["<script>alert(1)</script>", "=HYPERLINK(1)", "\u202eevil", "x" * 10_000, "$a_{b"]
 EVENT = {
@@ -57,6 +61,7 @@ def make_facts(names=("P1", "P2"), simulated=True, buildings=False):
         stations,
         "",
         "per-obspy 0.1.0.",
+        COVERAGE,
     )
 
 
@@ -87,7 +92,7 @@ def test_the_summary_says_what_where_and_how_sure():
         "Epicentre 35.770 north, 117.600 west, depth 8 km.",
         "SIMULATED. THIS IS NOT AN EARTHQUAKE.",
         "Stations used, 2: XX.A, XX.C. Stations missing or refused, 1: XX.B.",
-        "16 pairs of buildings screened.",
+        "16 of 20 pairs are screened.",
         "5 pairs that pound or are likely to.",
         "5 pairs expected to pound in all.",
         "5 pairs of the worst class, severe.",
@@ -141,6 +146,40 @@ def test_the_page_is_one_and_no_text_leaves_it(page_text, monkeypatch, names, bu
     drawn = " ".join(text.get_text() for text in texts)
     assert "SIMULATED" in drawn
     assert ("The worst buildings" in drawn) == buildings
+
+
+def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):
+    """Catch a legend that leaves the sheet, and an account that pushes the pairs off it."""
+    names = ["life at risk", "very severe", "severe", "high", "moderate", "low", "lowest of all"]
+    kinds = {f"a reason of many words, number {i}": 10**6 for i in range(12)}
+    areas = [("a ward with a long name", 10**6)] * 3
+    search = Search(10**6, kinds, kinds, areas)
+    facts = make_facts(buildings=True)
+    facts = facts._replace(
+        region=facts.region._replace(classes=names),
+        counts=facts.counts._replace(classes=dict.fromkeys([*names, "gap unknown"], 123_456)),
+        coverage=Coverage(10**6, 10, kinds, areas, search),
+    )
+    figure, _ = page_text(facts, monkeypatch)
+    figure.draw_without_rendering()
+    boxes = {text: text.get_window_extent() for text in figure.texts if text.get_text()}
+    right = 0.93 * figure.bbox.width
+    legend = [text for text in boxes if text.get_text().endswith(" 123456")]
+    assert len(legend) == 8
+    assert max(boxes[text].x1 for text in legend) <= right
+    assert min(box.y0 for box in boxes.values()) >= 0.0
+    # The map is above its legend, which is on several lines
+    (axes,) = figure.axes
+    assert len({round(boxes[text].y0) for text in legend}) > 1
+    assert max(boxes[text].y1 for text in legend) < axes.get_tightbbox().y0
+    first = min(boxes[text].y0 for text in legend)
+    (title,) = (text for text in boxes if text.get_text() == "pair")
+    assert boxes[title].y1 < first
+    # None of the texts lies on another one
+    for one, two in combinations(boxes.values(), 2):
+        width = min(one.x1, two.x1) - max(one.x0, two.x0)
+        height = min(one.y1, two.y1) - max(one.y0, two.y0)
+        assert not (width > 1.0 and height > 0.3 * min(one.height, two.height))
 
 
 def test_the_same_facts_are_the_same_bytes(tmp_path):

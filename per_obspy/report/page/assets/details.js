@@ -42,15 +42,16 @@ class Details {
     const { t, number } = this.page;
     const known = (name) => Number.isFinite(this.value(name, i));
     const said = [];
-    if (known("probability")) said.push(t("says_probability", { value: number(100 * this.value("probability", i), 0) }));
+    if (known("probability")) said.push(t("says_probability", { value: this.page.percent(this.value("probability", i)) }));
     if (known("expected_impact_velocity") && this.value("expected_impact_velocity", i) > 0) {
-      said.push(t("says_velocity", {
+      said.push(t(known("impact_velocity_84") ? "says_velocity" : "says_velocity_alone", {
         value: this.page.number(100 * this.value("expected_impact_velocity", i), 0),
         high: this.page.number(100 * this.value("impact_velocity_84", i), 0),
       }));
     }
     const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
-    said.push(gap, t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
+    said.push(gap);
+    if (known("demand")) said.push(t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
     if (this.value("impacts", i) > 0) {
       said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(100 * this.value("impact_velocity_exact", i), 0) }));
     }
@@ -168,11 +169,17 @@ class Details {
     const { t, number } = this.page;
     const said = [];
     const [missing, damping, bumper] = ["missing_gap", "supplemental_damping", "bumper_restitution"].map((name) => this.value(name, i));
-    if (missing > 0) said.push(t("prevents_gap", { value: number(100 * missing, 1), whole: this.centimetres("demand", i) }));
-    if (Number.isFinite(damping) && damping > 0) said.push(t("prevents_damping", { value: number(100 * damping, 0) }));
-    else if (missing > 0 && !Number.isFinite(damping)) said.push(t("prevents_no_damping"));
-    if (Number.isFinite(bumper)) said.push(t("prevents_bumper", { value: number(bumper, 2) }));
-    if (!said.length) said.push(t("prevents_nothing"));
+    // The case is decided where the page is written, see words.prevention_kind
+    const kind = this.value("prevention_kind", i);
+    const values = { gap: this.centimetres("gap", i), whole: this.centimetres("demand", i), name: this.value("worst_scenario", i) };
+    if (kind !== "gap") said.push(t(`prevents_${kind}`, values));
+    else {
+      said.push(t("prevents_gap", { value: number(100 * missing, 1), whole: values.whole }));
+      if (!this.value("station", i)) said.push(t("prevents_without_record"));
+      else if (damping > 0) said.push(t("prevents_damping", { value: number(100 * damping, 0) }));
+      else said.push(t("prevents_no_damping"));
+      if (bumper < 1) said.push(t("prevents_bumper", { value: number(bumper, 2) }));
+    }
     return [element("h3", {}, t("prevention")), element("ul", {}, ...said.map((text) => element("li", {}, text)))];
   }
 
@@ -214,7 +221,7 @@ class Details {
     const heads = ["column_input", "column_low", "column_then", "column_high", "column_then"];
     const table = element("table", {}, element("tr", {}, ...heads.map((key) => element("th", { scope: "col" }, t(key)))));
     for (const [name, low, high, chanceLow, chanceHigh, stateLow, stateHigh] of rows) {
-      const then = (chance, state) => element("td", {}, t("chance_and_state", { chance: this.page.number(100 * chance, 0), state: this.stateLabel(state) }));
+      const then = (chance, state) => element("td", {}, t("chance_and_state", { chance: this.page.percent(chance), state: this.stateLabel(state) }));
       table.append(element("tr", {}, element("th", { scope: "row" }, this.page.inputName(name)), element("td", {}, this.inputText(name, low)), then(chanceLow, stateLow), element("td", {}, this.inputText(name, high)), then(chanceHigh, stateHigh)));
     }
     return [...made, element("div", { class: "scroll" }, table), element("p", { class: "small" }, t("sensitivity_note")), ...this.fixedInputs(derived, rows)];

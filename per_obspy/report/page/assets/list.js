@@ -222,7 +222,8 @@ class PairList {
     for (const [name, factor, digits] of this.columns) {
       const values = page.pairs.column[name];
       if (factor) {
-        made.append(element("td", { class: "number" }, page.number(factor * values[i], digits)));
+        const text = name === "probability" ? page.percent(values[i]) : page.number(factor * values[i], digits);
+        made.append(element("td", { class: "number" }, text));
       } else if (name === "pair_id") {
         const button = element("button", { type: "button" }, values[i]);
         button.addEventListener("click", () => page.choose(i, true));
@@ -246,7 +247,7 @@ class PairList {
   csv() {
     const stored = this.page.content.stored ? this.page.content.stored().column : {};
     const column = { ...this.page.pairs.column, ...stored };
-    const names = Object.keys(column);
+    const names = Object.keys(column).filter((name) => name !== "prevention_kind");
     const lines = [names.map(quoted).join(",")];
     for (const i of this.found) lines.push(names.map((name) => cellText(column[name], i)).join(","));
     return `${lines.join("\r\n")}\r\n`;

@@ -28,8 +28,19 @@ class Page {
 
   whole(value) { return this.number(value, 0); }
 
-  // A number with at most four digits
-  short(value) { return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4 }); }
+  // A number with at most four digits; tiny ones would have dozens of zeros
+  short(value) {
+    if (value !== 0 && Math.abs(value) < 0.001) return `< ${this.number(0.001, 3)}`;
+    return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4 });
+  }
+
+  // A probability in percent: 0 and 100 only where it is exactly that
+  percent(value) {
+    if (value > 0 && value < 0.001) return `< ${this.number(0.1, 1)}`;
+    if (value < 1 && value > 0.999) return `> ${this.number(99.9, 1)}`;
+    const near = value > 0 && value < 1 && (value < 0.01 || value > 0.99);
+    return this.number(100 * value, near ? 1 : 0);
+  }
 
   setGrades() {
     this.stateCodes = this.codes("state", this.content.states);
@@ -75,7 +86,7 @@ class Page {
     const text = (values) => (values ? values.texts[values.codes ? values.codes[i] : i] : "");
     const said = [this.t("building_says", {
       rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
-      hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.number(100 * column.probability_common[i], 0),
+      hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.percent(column.probability_common[i]),
     })];
     if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(100 * column.impact_velocity[i], 0) }));
     const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
@@ -125,6 +136,9 @@ class Page {
     for (const place of document.querySelectorAll("[data-label]")) place.setAttribute("aria-label", this.t(place.dataset.label));
     document.title = `${content.title} – per_obspy`;
     byId("title").textContent = content.title;
+    for (const [i, text] of (content.coverage || []).entries()) {
+      byId("coverage").append(element("p", { class: content.warns && !i ? "warning" : "" }, text));
+    }
     byId("event").textContent = content.event;
     byId("revision").textContent = content.revision || "";
     byId("expected").textContent = content.expected || "";

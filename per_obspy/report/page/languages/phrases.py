@@ -5,8 +5,8 @@ import re
 #: English phrase, as the module that writes it has it -> Spanish phrase.
 SPANISH_PHRASES: dict[str, str] = {
     # Prevention of buildings
-    "no measure: its gaps are enough in this record": (
-        "ninguna medida: sus separaciones bastan en este registro"
+    "no measure for the likeliest inputs: its gaps are enough": (
+        "ninguna medida para los datos más probables: sus separaciones bastan"
     ),
     "wider gaps elsewhere in its row: its own are enough for each pair alone": (
         "separaciones más anchas en otra parte de su fila: las suyas bastan para cada par solo"

@@ -6,8 +6,6 @@ SPANISH: dict[str, str] = {
     "summary": "resumen",
     "do_first": "Qué hacer primero",
     "how_sure": "Qué tan seguro es",
-    "number_pairs": "pares evaluados",
-    "number_pairs_one": "par evaluado",
     "number_pounding": "pares chocan, con seguridad o probablemente",
     "number_pounding_one": "par choca, con seguridad o probablemente",
     "number_expected": "choques esperados",
@@ -37,7 +35,7 @@ SPANISH: dict[str, str] = {
     "todo_unknown_one": "Mida {count} separación desconocida: sin ella no hay veredicto.",
     "todo_possible_one": "Después revise {count} par con choque posible pero no probable.",
     "todo_possible": "Después revise los {count} pares con choque posible pero no probable.",
-    "todo_none": "Ningún par chocó probablemente; revise los posibles.",
+    "todo_none": "Es probable que ningún par choque; revise los posibles.",
     "sure_expected": (
         "Se esperan {mean} pares con choque; la desviación estándar está entre {low} (pares "
         "independientes) y {high} (una sola causa)."
@@ -124,10 +122,15 @@ SPANISH: dict[str, str] = {
     "building": "Edificio",
     "close": "cerrar",
     "says_probability": "La probabilidad de choque en este evento es {value} %.",
+    "says_probability_design": "La probabilidad de choque con este espectro es {value} %.",
+    "says_probability_ensemble": (
+        "La probabilidad de choque, si ocurre uno de los escenarios, es {value} %."
+    ),
     "says_velocity": (
         "Se espera que los edificios se encuentren a {value} cm/s; en 84 de 100 casos a lo sumo a "
         "{high} cm/s."
     ),
+    "says_velocity_alone": "Se espera que los edificios se encuentren a {value} cm/s.",
     "says_touching": "Los edificios se tocan: la separación es 0 cm.",
     "says_gap": "La separación es {value} cm.",
     "says_no_gap": "La separación es desconocida.",
@@ -143,6 +146,9 @@ SPANISH: dict[str, str] = {
     "rule_linearized": "estimada para edificios que fluyen",
     "rule_srss": "SRSS, porque un período es derivado",
     "rule_shakemap": "de un ShakeMap",
+    "rule_sd_white_noise": "estimada con el espectro",
+    "rule_sd_srss": "SRSS del espectro, porque un período es derivado",
+    "rule_": "regla desconocida",
     "both_buildings": "Ambos edificios",
     "fact_building_id": "edificio",
     "fact_height": "altura, m",
@@ -175,13 +181,33 @@ SPANISH: dict[str, str] = {
         "registro. Para este par, en la carpeta de los resultados: {command}"
     ),
     "prevention": "Qué lo habría evitado",
+    "prevention_design": "Qué lo evitaría",
+    "prevention_ensemble": "Qué lo evitaría",
     "prevents_gap": "{value} cm más de separación, {whole} cm en total.",
     "prevents_damping": "{value} % del amortiguamiento crítico añadido a ambos edificios.",
     "prevents_no_damping": "Solo amortiguamiento no basta: 40 % del crítico es muy poco.",
     "prevents_bumper": (
         "Topes no lo evitan pero lo suavizan: restitución a lo sumo {value} (estimación)."
     ),
-    "prevents_nothing": "En este evento no hace falta nada.",
+    "prevents_without_record": "Amortiguamiento y topes: no se calculan sin registro.",
+    "prevents_unknown_gap": (
+        "La separación es desconocida: mídala primero. La separación necesaria es {whole} cm."
+    ),
+    "prevents_unknown_gap_ensemble": "La separación es desconocida: mídala primero.",
+    "prevents_not_computed": "No se calculó para este par.",
+    "prevents_not_computed_ensemble": (
+        "No se calcula para varios escenarios juntos: vea los resultados del peor, {name}."
+    ),
+    "prevents_in_doubt": (
+        "La separación de {gap} cm basta para los datos más probables, que necesitan {whole} cm. "
+        "La probabilidad cuenta otros valores de los datos, con los que no basta."
+    ),
+    "prevents_nothing": (
+        "En este evento no hace falta nada: la separación es {gap} cm, la necesaria {whole} cm."
+    ),
+    "prevents_nothing_design": (
+        "Con este espectro no hace falta nada: la separación es {gap} cm, la necesaria {whole} cm."
+    ),
     "flags": "Marcas",
     "derived": "Datos derivados",
     "derived_spread": (
