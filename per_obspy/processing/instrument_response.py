@@ -1,5 +1,6 @@
 """Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -28,6 +29,10 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
 
+
+#: Codes of accelerometers, and frequencies, Hz, between which their response to acceleration falls
+#: by no more than this factor: that of a velocity sensor falls 5 times.
+ACCELEROMETER, FLAT_BAND, FLAT = re.compile(r"[A-Z]N[A-Z0-9]"), (1.0, 5.0), 2.5
 
 #: Most seconds of zeros behind a record: the response of the filter is much shorter.
 LONGEST_PAD = 3600.0
@@ -82,6 +87,7 @@ def _convert(trace: Trace, tolerance: float) -> None:
         is_accelerometer = _is_accelerometer(trace, response)
         _require_consistent(trace, response, tolerance)
         if any(type(stage) is not ResponseStage for stage in response.response_stages):
+            _require_flat(trace, response)
             _deconvolve(trace, ACCELERATION_BAND if is_accelerometer else VELOCITY_BAND)
         elif is_accelerometer:
             _divide_sensitivity(trace, response)
@@ -124,6 +130,27 @@ def _require_consistent(trace: Trace, response: Response, tolerance: float) -> N
             trace.id,
             f"product of stage gains {product:g}, overall sensitivity {overall!r}: "
             f"more than {tolerance:.0%} apart",
+        )
+
+
+def _require_flat(trace: Trace, response: Response) -> None:
+    """Reject an accelerometer, by its code, whose response is that of a velocity sensor."""
+    units = str(response.instrument_sensitivity.input_units)
+    is_doubtful = units.upper() in VELOCITY_UNITS and ACCELEROMETER.fullmatch(trace.stats.channel)
+    try:
+        low, high = (
+            np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
+            if is_doubtful
+            else (1.0, 1.0)
+        )
+    except (ValueError, NotImplementedError, ArithmeticError):
+        return  # refused when it is removed
+    if low > FLAT * high:
+        ends = f"from {FLAT_BAND[0]:g} to {FLAT_BAND[1]:g} Hz"
+        raise RecordRejected(
+            trace.id,
+            f"response from {units} of an accelerometer: its response to acceleration falls "
+            f"{low / high:.2g} times {ends} (M/S in place of M/S**2?)",
         )
 
 

@@ -7,7 +7,6 @@ from per_obspy.processing.quality.raw_checks import (
     header_findings,
     later_event,
     longest_extreme_run,
-    outlier_findings,
     raw_findings,
 )
 
