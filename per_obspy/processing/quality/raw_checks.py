@@ -51,8 +51,8 @@ FEWEST_EXCURSIONS, FEWEST_AT_TOP, FLATNESS = 2, 10, 0.3
 #: The extreme is repeated at least so many times as often as any other value of its size.
 OTHER_REPEATS = 3
 
-#: Least step of an overflow, and least distance of both its ends from the middle; shares of the
-#: range.
+#: Least step of an overflow, and least distance of both its ends from the middle in the median of
+#: all steps; shares of the range.
 OVERFLOW_STEP, OVERFLOW_END = 0.5, 0.2
 
 #: Samples lie on a straight line if their jumps are below this share of those of moving ground.
@@ -377,11 +377,11 @@ def overflow_roughness(samples: FloatArray) -> float:
         Root mean square of the jumps around these steps, after over before; infinite with fewer
         than two such steps.
     """
-    middle, full = (samples.max() + samples.min()) / 2, np.ptp(samples)
+    middle, full = np.median(samples), np.ptp(samples)
     steps = np.flatnonzero(np.abs(np.diff(samples)) > OVERFLOW_STEP * full)
     # Both ends of an overflow are near opposite extremes, those of a spike are not
     ends = np.minimum(np.abs(samples[steps] - middle), np.abs(samples[steps + 1] - middle))
-    if steps.size < 2 or ends.min() < OVERFLOW_END * full:
+    if steps.size < 2 or np.median(ends) < OVERFLOW_END * full:
         return np.inf
     # Jumps around the steps as they are, and turned back
     around = np.unique(np.clip(steps[:, None] + np.arange(-2, 4), 1, samples.size - 2))
