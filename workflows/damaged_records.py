@@ -5,7 +5,7 @@ Run: ``python workflows/damaged_records.py FOLDER [STATION]`` with a folder of r
 StationXML, and QuakeML if there is some; prints the table of docs/processing.md. Every variant is a
 whole run with the other stations unchanged; they are resumed. STATION is ``NET.STA``; without it,
 the station with the largest samples. Found is what gets a flag, warning or rejection that names the
-fault; another one is printed as "other reason". It takes about five minutes.
+fault; another one is printed as "other reason". It takes a few minutes.
 """
 
 import logging
@@ -25,6 +25,8 @@ from obspy import Inventory, Stream, read
 from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.config import Run
+from per_obspy.pipeline import stages
+from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.run import run
 from per_obspy.records.folder import find_stations
 
@@ -34,10 +36,10 @@ Samples = NDArray[np.float64]
 SEED = 7
 
 #: Words of which one must be in what is said of a fault.
-AMPLITUDE = ("implausible", "peak acceleration", "peak velocity", "beyond")
+AMPLITUDE = ("implausible_amplitude", "peak acceleration", "peak velocity, m/s", "beyond 1e+30")
 LOST, LIMIT = ("filled", "dropout"), ("clipped",)
-TIMES = ("sampling", "time", "duration", "implausible")
-PLACE = ("coordinates", "far", "implausible", "place")
+TIMES = ("sampling rate", "sampling interval")
+PLACE = ("coordinates", "implausible_place", "its place", "would be")
 
 
 class Record(NamedTuple):
@@ -289,9 +291,13 @@ FAULTS = (
     Fault("100 times as small", sensitivity(1 / 100), AMPLITUDE),
     Fault("981 times as small", sensitivity(1 / 981), AMPLITUDE),
     Fault("peak of 1e18 m/s²", scaled_to(1e18), AMPLITUDE),
-    Fault("peak of 1e306 m/s²", scaled_to(1e290), AMPLITUDE),
+    Fault("peak of 1e300 m/s²", scaled_to(1e300), AMPLITUDE),
     Fault("M/S for M/S**2 in StationXML", units("M/S"), ("M/S",)),
-    Fault("velocity in place of acceleration", as_velocity, AMPLITUDE),
+    Fault(
+        "velocity in place of acceleration",
+        as_velocity,
+        ("implausible_amplitude", "peak velocity over peak"),
+    ),
     Fault("one component 9.81 times as large", each(lambda x: 9.81 * x, "E"), ("peak over",)),
     Fault("sampling interval twice", interval(2), TIMES),
     Fault("sampling interval half", interval(0.5), TIMES),
@@ -327,7 +333,11 @@ FAULTS = (
     Fault("a spike of 3 times the peak", each(spike), ("spike",)),
     Fault("baseline steps by 0.2 m/s²", step, ("spike or step", "baseline", "drifts", "final")),
     Fault("ends a second after the peak", ending_at_peak, ("ends while shaking",)),
-    Fault("samples of another station", of_another_station, ("samples", "copy", "copies")),
+    Fault(
+        "samples of another station",
+        of_another_station,
+        ("its record is that of", "repeated_record"),
+    ),
     Fault("station at 0, 0", place(lambda *_: (0.0, 0.0)), PLACE),
     Fault("coordinates exchanged", place(lambda south, east: (south, -east / 2)), PLACE),
 )
@@ -395,7 +405,8 @@ class Bench:
                 "output": str(self.work / "out"),
                 "workers": 1,
                 "records": {"folder": str(self.records)} | self.event(),
-                "pairs": {"simulated": {"count": 20, "seed": SEED}},
+                "pairs": {"simulated": {"count": 5, "seed": SEED}},
+                "screening": {"exact": False},
             }
         )
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
@@ -425,4 +436,6 @@ class Bench:
 
 if __name__ == "__main__":
     logging.disable()
+    # Figures and page say no more of a station than its tables, and take most of the time
+    stages.reported = lambda *_: Report([], [])
     main(Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else None)

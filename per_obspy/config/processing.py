@@ -73,7 +73,7 @@ class Checks(Section):
         description="the same ratio, from which a record may be clipped",
     )
     wrapped: Check = Field(
-        Check(threshold=0.65, level="reject"),
+        Check(threshold=0.4, level="reject"),
         description=(
             "smallest roughness that is left where steps across the range are turned back as "
             "overflows of the counter, relative to the roughness before"

@@ -125,7 +125,9 @@ def _comparisons(stream: Stream, checks: Checks) -> Iterator[tuple[str, Finding]
     yield from copies
     if not copies and motions:
         yield from _late_components(motions, horizontals, stream[0].stats.delta, checks)
-        yield from _exchanged_components(motions, horizontals, checks)
+        # Simulated motion has no P waves
+        if not any(trace.stats.get("simulated") for trace in stream):
+            yield from _exchanged_components(motions, horizontals, checks)
 
 
 def _outliers(peaks: dict[str, float], checks: Checks) -> Iterator[tuple[str, Finding]]:
