@@ -62,8 +62,10 @@ def process_instrument(
     if components and is_processed(components[0]):
         # Series of velocity or displacement are no acceleration
         pair, rejected = _physical_pair(components, settings, _conversion_steps(settings)[1:])
-        steps = (_compared(pair, settings), partial(passed_through, settings=settings))
-        passed, unfit = _in_turn(taken(pair), steps)
+        compared = _compared(pair, settings)
+        passed, unfit = _in_turn(
+            taken(pair), (compared, partial(passed_through, settings=settings))
+        )
         return passed, (*rejected, *unfit)
     # Each component in m/s2, then all of them around the shaking
     windowed, unusable = _windowed(components, settings, source)
