@@ -36,7 +36,10 @@ Samples = NDArray[np.float64]
 SEED = 7
 
 #: Words of which one must be in what is said of a fault.
-AMPLITUDE = ("implausible_amplitude", "peak acceleration", "peak velocity, m/s", "beyond 1e+30")
+AMPLITUDE = (
+    *("implausible_amplitude", "peak ground", "peak acceleration", "peak velocity, m/s"),
+    "beyond 1e+30",
+)
 LOST, LIMIT = ("filled", "dropout"), ("clipped",)
 TIMES = ("sampling rate", "sampling interval")
 PLACE = ("coordinates", "implausible_place", "its place", "would be")
@@ -339,7 +342,7 @@ FAULTS = (
         ("its record is that of", "repeated_record"),
     ),
     Fault("station at 0, 0", place(lambda *_: (0.0, 0.0)), PLACE),
-    Fault("coordinates exchanged", place(lambda south, east: (south, -east / 2)), PLACE),
+    Fault("longitude without its sign", place(lambda south, east: (south, -east)), PLACE),
 )
 
 

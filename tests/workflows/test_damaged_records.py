@@ -26,7 +26,7 @@ SILENT = {
     "saturated softly at 50 %",
     "samples of another station",
     "station at 0, 0",
-    "coordinates exchanged",
+    "longitude without its sign",
 }
 
 
