@@ -54,6 +54,10 @@ SHOWN = {
 WARNINGS = {
     "baseline_shift": "with a baseline shift",
     "second_event": "with a second event",
+    "clipped": "that may be clipped",
+    "wrapped": "with a counter that overflowed",
+    "filled": "with a filled gap",
+    "implausible_record": "with an implausible record",
     "assumed_corners": "with assumed corners",
     "digitised": "digitised from film",
     "undated": "without a date",

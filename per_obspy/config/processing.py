@@ -35,6 +35,14 @@ class Checks(Section):
     sampling_rate: Check = Field(
         Check(threshold=20.0, level="reject"), description="smallest sampling rate, Hz"
     )
+    sampling_interval: Check = Field(
+        Check(threshold=0.2, level="reject"),
+        description="longest sampling interval of any record, s: longer ones hold no strong motion",
+    )
+    channel_rate: Check = Field(
+        Check(threshold=0.01, level="warn"),
+        description="largest relative difference between the sampling rates of record and metadata",
+    )
     duration: Check = Field(
         Check(threshold=5.0, level="reject"), description="shortest duration, s"
     )
@@ -46,6 +54,31 @@ class Checks(Section):
         Check(threshold=5, level="reject"),
         description="number of equal samples at an extreme from which a record is clipped",
     )
+    pinned: Check = Field(
+        Check(threshold=3, level="reject"),
+        description=(
+            "number of samples equal to an extreme, of a record that does not repeat other values, "
+            "from which it is clipped"
+        ),
+    )
+    saturation: Check = Field(
+        Check(threshold=2.0, level="reject"),
+        description=(
+            "largest ratio of samples within 5 % of an extreme to those 5 to 15 % below it, at "
+            "several flat excursions"
+        ),
+    )
+    possible_saturation: Check = Field(
+        Check(threshold=1.0, level="warn"),
+        description="the same ratio, from which a record may be clipped",
+    )
+    wrapped: Check = Field(
+        Check(threshold=0.4, level="reject"),
+        description=(
+            "smallest roughness that is left where steps across the range are turned back as "
+            "overflows of the counter, relative to the roughness before"
+        ),
+    )
     counter_use: Check = Field(
         Check(threshold=0.8, level="warn"),
         description="largest peak relative to the full scale of a 24-bit counter",
@@ -53,6 +86,13 @@ class Checks(Section):
     dropout: Check = Field(
         Check(threshold=0.5, level="reject"),
         description="duration without a change during the shaking that means missing samples, s",
+    )
+    filled: Check = Field(
+        Check(threshold=0.09, level="reject"),
+        description=(
+            "longest time during the shaking whose samples are equal or on a straight line, as in "
+            "a gap that was filled, if other such times are 4 times shorter, s"
+        ),
     )
     spike: Check = Field(
         Check(threshold=6.0, level="reject"),
@@ -69,6 +109,64 @@ class Checks(Section):
     outlier: Check = Field(
         Check(threshold=5.0, level="reject"),
         description="largest ratio of a peak to the largest peak of two other components",
+    )
+    weak_component: Check = Field(
+        Check(threshold=5.0, level="reject"),
+        description=(
+            "largest ratio of the peaks of two horizontals (4 times as much to the vertical), from "
+            "which the smaller one is left out"
+        ),
+    )
+    copied_component: Check = Field(
+        Check(threshold=0.999, level="reject"),
+        description="largest correlation of two components: beyond it one is a copy of the other",
+    )
+    late_component: Check = Field(
+        Check(threshold=1.0, level="reject"),
+        description="largest time between the envelopes of two horizontals, s",
+    )
+    exchanged_component: Check = Field(
+        Check(threshold=0.4, level="warn"),
+        description=(
+            "largest logarithm of the share of early motion (P waves) of a horizontal over that of "
+            "the vertical and that of the other horizontal"
+        ),
+    )
+    unusual_acceleration: Check = Field(
+        Check(threshold=43.0, level="warn"),
+        description=(
+            "largest peak acceleration, m/s2: the largest one recorded is 42.8 (vector of three "
+            "components, IWTH25, Iwate-Miyagi 2008)"
+        ),
+    )
+    impossible_acceleration: Check = Field(
+        Check(threshold=86.0, level="reject"),
+        description="largest possible peak acceleration, m/s2: twice the largest one recorded",
+    )
+    unusual_velocity: Check = Field(
+        Check(threshold=3.2, level="warn"),
+        description=(
+            "largest peak velocity, m/s: the largest one recorded is 3.18 (Chi-Chi 1999; Anderson "
+            "2010, BSSA 100, 1-36)"
+        ),
+    )
+    impossible_velocity: Check = Field(
+        Check(threshold=6.4, level="reject"),
+        description="largest possible peak velocity, m/s: twice the largest one recorded",
+    )
+    weak_motion: Check = Field(
+        Check(threshold=1e-4, level="warn"),
+        description=(
+            "smallest peak acceleration, m/s2: weaker motion is a tenth of what people feel, or in "
+            "another unit"
+        ),
+    )
+    velocity_time: Check = Field(
+        Check(threshold=3.0, level="reject"),
+        description=(
+            "largest ratio of peak velocity to peak acceleration, s (below 1 s on the lake bed of "
+            "Mexico City): beyond it the sampling interval is wrong"
+        ),
     )
     late_trigger: Check = Field(
         Check(threshold=0.1, level="warn"),

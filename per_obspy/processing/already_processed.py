@@ -13,9 +13,9 @@ from per_obspy.processing.filter.corners import (
     usable_periods_noted,
 )
 from per_obspy.processing.notes import copied_trace, noted, remembered
-from per_obspy.processing.quality.final_checks import final_findings
+from per_obspy.processing.quality.final_checks import AT_REST, final_findings
 from per_obspy.processing.quality.findings import judged
-from per_obspy.processing.quality.raw_checks import header_findings
+from per_obspy.processing.quality.raw_checks import final_sample_findings
 from per_obspy.processing.quality.record_flags import flags_noted
 
 
@@ -26,7 +26,8 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
     Without a high-pass corner in the header, the corner that would clean the displacement limits
     the usable periods (no filter is applied); without a low-pass corner, 0.75 of the Nyquist
     frequency. Velocity or displacement that does not come to rest, and a peak that is not the
-    header's, are warnings: the samples are final.
+    header's, are warnings: the samples are final. What no ground motion can be is rejected as in
+    raw records.
 
     Parameters
     ----------
@@ -38,12 +39,21 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
     Returns
     -------
     obspy Stream
+
+    Raises
+    ------
+    RecordRejected
+        If a check of a trace rejects, with every reason.
     """
     out = Stream()
     for trace in stream:
         limited = _with_corners(trace, settings)
-        found = (*header_findings(trace, settings.checks), *final_findings(trace, settings.checks))
-        out += judged(limited, [finding._replace(level="warn") for finding in found])
+        findings = list(final_sample_findings(trace, settings.checks))
+        for finding in final_findings(trace, settings.checks):
+            # Their corners are no choice of this program
+            is_final = finding.check in AT_REST
+            findings.append(finding._replace(level="warn") if is_final else finding)
+        out += judged(limited, findings)
     return flags_noted(usable_periods_noted(out, settings.usable))
 
 

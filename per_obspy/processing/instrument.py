@@ -23,10 +23,11 @@ from per_obspy.processing.filter.corners import (
 )
 from per_obspy.processing.instrument_response import in_acceleration
 from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
-from per_obspy.processing.notes import copied, is_processed, taken
+from per_obspy.processing.notes import copied, is_processed, rejection, taken
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import Finding, judged, surviving
-from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
+from per_obspy.processing.quality.physical_limits import acceleration_findings, component_findings
+from per_obspy.processing.quality.raw_checks import CLIPPED, raw_findings
 from per_obspy.processing.quality.record_flags import flags_noted
 from per_obspy.processing.station.components import is_horizontal, paired
 
@@ -61,7 +62,11 @@ def process_instrument(
     if components and is_processed(components[0]):
         # Series of velocity or displacement are no acceleration
         pair, rejected = _physical_pair(components, settings, _conversion_steps(settings)[1:])
-        return passed_through(pair, settings), rejected
+        compared = _compared(pair, settings)
+        passed, unfit = _in_turn(
+            taken(pair), (compared, partial(passed_through, settings=settings))
+        )
+        return passed, (*rejected, *unfit)
     # Each component in m/s2, then all of them around the shaking
     windowed, unusable = _windowed(components, settings, source)
     # Baseline and corners of each component; the horizontals share the narrower band
@@ -90,8 +95,21 @@ def _physical_pair(
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """Return the components in m/s2, the horizontals over their common time; empty the input."""
     physical, unfit = _in_turn(taken(components), steps)
+    # Sensor and recorder are one: what one component lost at their limit, others lost as well
+    clipped = [
+        row.name for row in unfit if any(reason.startswith(CLIPPED) for reason in row.reasons)
+    ]
+    if clipped:
+        reason = f"{CLIPPED}: {', '.join(clipped)} of the same instrument"
+        return Stream(), (*unfit, *(rejection(trace, reason) for trace in physical))
     pair, unpaired = paired(physical, settings.overlap)
     return pair, (*unfit, *unpaired)
+
+
+def _compared(stream: Stream, settings: Processing) -> Step:
+    """Return the step that judges each component of a stream by the others."""
+    findings = component_findings(stream, settings.checks)
+    return lambda single: judged(single[0], findings.get(single[0].id, []))
 
 
 def _horizontals_banded(stream: Iterable[Trace]) -> Stream:
@@ -104,10 +122,11 @@ def _horizontals_banded(stream: Iterable[Trace]) -> Stream:
 
 
 def _conversion_steps(settings: Processing) -> tuple[Step, ...]:
-    """Return the checks of raw samples and the conversion to m/s2."""
+    """Return the checks of raw samples, the conversion to m/s2, and the limits of its peak."""
     return (
         lambda stream: judged(stream[0], raw_findings(stream[0], settings.checks)),
         partial(in_acceleration, gain_tolerance=settings.gain_tolerance),
+        lambda stream: judged(stream[0], acceleration_findings(stream[0], settings.checks)),
     )
 
 
@@ -130,8 +149,7 @@ def _windowed(
 def _baseline_steps(
     stream: Stream, settings: Processing, source: Source | None
 ) -> tuple[Step, ...]:
-    """Return the check for outliers among the components and the choice of baseline and corners."""
-    outliers = outlier_findings(stream, settings.checks)
+    """Return the comparison of the components, and the choice of baseline and corners."""
     magnitude = source.magnitude if source else _header_magnitude(stream)
 
     def fallback() -> Corner:
@@ -145,7 +163,7 @@ def _baseline_steps(
         chosen: Step = partial(offset_kept, settings=settings)
     else:
         chosen = partial(corners_noted, settings=settings, fallback=fallback)
-    return lambda single: judged(single[0], outliers.get(single[0].id, [])), chosen
+    return _compared(stream, settings), chosen
 
 
 def _header_magnitude(stream: Stream) -> float | None:

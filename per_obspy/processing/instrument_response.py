@@ -30,6 +30,10 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
 
+#: Codes of accelerometers, and frequencies, Hz, between which their response to acceleration falls
+#: by no more than this factor: that of a velocity sensor falls 5 times.
+ACCELEROMETER, FLAT_BAND, FLAT = re.compile(r"[A-Z]N[A-Z0-9]"), (1.0, 5.0), 2.5
+
 #: Most seconds of zeros behind a record: the response of the filter is much shorter.
 LONGEST_PAD = 3600.0
 
@@ -233,6 +237,7 @@ def _convert(trace: Trace, tolerance: float) -> None:
         _require_consistent(trace, response, tolerance)
         unit, response = _response_of_sensor(trace, response)
         if any(type(stage) is not ResponseStage for stage in response.response_stages):
+            _require_flat(trace, response)
             band = ACCELERATION_BAND if unit == "m/s2" else VELOCITY_BAND
             _deconvolve(trace, response, band)
         elif unit == "m/s2":
@@ -325,6 +330,29 @@ def _require_consistent(trace: Trace, response: Response, tolerance: float) -> N
             trace.id,
             f"product of stage gains {product:g}, overall sensitivity {overall!r}: "
             f"more than {tolerance:.0%} apart",
+        )
+
+
+def _require_flat(trace: Trace, response: Response) -> None:
+    """Reject an accelerometer, by its code, whose response is that of a velocity sensor."""
+    units = str(response.instrument_sensitivity.input_units)
+    motion = unit_of_si(units)
+    is_velocity = motion is not None and motion.quantity == "velocity"
+    is_doubtful = is_velocity and ACCELEROMETER.fullmatch(trace.stats.channel)
+    try:
+        low, high = (
+            np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
+            if is_doubtful
+            else (1.0, 1.0)
+        )
+    except (ValueError, NotImplementedError, ArithmeticError):
+        return  # refused when it is removed
+    if low > FLAT * high:
+        ends = f"from {FLAT_BAND[0]:g} to {FLAT_BAND[1]:g} Hz"
+        raise RecordRejected(
+            trace.id,
+            f"response from {units} of an accelerometer: its response to acceleration falls "
+            f"{low / high:.2g} times {ends} (M/S in place of M/S**2?)",
         )
 
 

@@ -152,6 +152,8 @@ def _describe(trace: Trace, channel: Channel) -> None:
     stats = trace.stats
     if "sensor_azimuth" not in stats and "sensor_dip" not in stats:
         stats.update(_direction(channel))
+    if channel.sample_rate:
+        stats.channel_rate = float(channel.sample_rate)
     # Counts need a response, unless the file has their gain and StationXML no sensitivity
     if stats.get("units", "counts") == "counts" and (stats.calib == 1 or _sensitivity(channel)):
         stats.response = _response(trace, channel)

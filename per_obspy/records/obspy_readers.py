@@ -87,9 +87,11 @@ LARGEST_UNPACKED = 512 * 1024**2
 
 
 class _File(BytesIO):
-    """Bytes of a file under its name."""
+    """Bytes of a file under its name, which may end with a direction."""
 
-    name = ""
+    def __init__(self, content: bytes, name: str) -> None:
+        super().__init__(content)
+        self.name = name
 
 
 def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
@@ -204,9 +206,7 @@ def _called(
         if require := _CHECKS.get(name):
             require(content, str(source))
         if name in _HERE:
-            # The name may end with a direction
-            file = _File(content)
-            file.name = str(source)
+            file = _File(content, str(source))
             return reader(file, format=name, check_compression=False, **options)
         place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
         return _value_apart(kind, content, place, name, options)

@@ -267,6 +267,10 @@ ORDER = (
 RECORD_FLAGS = (
     "baseline_shift",
     "second_event",
+    "clipped",
+    "wrapped",
+    "filled",
+    "implausible_record",
     "assumed_corners",
     "digitised",
     "undated",
@@ -348,6 +352,18 @@ FLAGS: dict[str, str] = {
         "doubtful, and not usable where PER depends on when it shifted"
     ),
     "second_event": ("the station's record holds another event: its demand may be that of both"),
+    "clipped": (
+        "the station's record may have reached the limit of its sensor or recorder: the motion may "
+        "have been stronger"
+    ),
+    "wrapped": ("the counter of the station's record overflowed: peaks continue at its other end"),
+    "filled": (
+        "a gap of the station's record was filled during the shaking: the motion there is unknown"
+    ),
+    "implausible_record": (
+        "unit, sampling interval or components of the station's record contradict what the ground "
+        "can do, or each other: see stations.csv"
+    ),
     "assumed_corners": (
         "a filter corner of the station's record is assumed: neither noise nor header gives it"
     ),

@@ -17,14 +17,14 @@ RATE, COUNT = 100.0, 6000
 SETTINGS = Processing()
 
 
-def pulse(offset=0.0):
-    """Return an earthquake of 20 s between quiet ends, m/s2."""
+def pulse(channel="HNE"):
+    """Return an earthquake of 20 s between quiet ends, m/s2; each component is another one."""
     time = np.arange(COUNT) / RATE
-    rng = np.random.default_rng(4)
+    rng = np.random.default_rng(ord(channel[-1]))
     envelope = np.exp(-(((time - 30) / 6) ** 2))
     motion = rng.normal(size=COUNT) * envelope
     # The ground comes to rest
-    return motion - motion.sum() / envelope.sum() * envelope + offset
+    return motion - motion.sum() / envelope.sum() * envelope
 
 
 def trace(channel="HNE", samples=None, station="STA", **stats):
@@ -35,12 +35,13 @@ def trace(channel="HNE", samples=None, station="STA", **stats):
         "sampling_rate": RATE,
         "units": "m/s2",
     }
-    data = pulse() if samples is None else samples
+    data = pulse(channel) if samples is None else samples
     return Trace(data, header | {"starttime": UTCDateTime(2020, 1, 1)} | stats)
 
 
-def station(**stats):
-    return Stream([trace(channel, **stats) for channel in ("HNE", "HNN", "HNZ")])
+def station(factor=1.0, offset=0.0, **stats):
+    codes = ("HNE", "HNN", "HNZ")
+    return Stream([trace(code, factor * pulse(code) + offset, **stats) for code in codes])
 
 
 def channels(stream):
@@ -59,13 +60,13 @@ def test_anything_else_is_named_with_its_type(wrong):
 
 
 def test_the_offset_of_the_baseline_does_not_matter():
-    plain, shifted = process(station()), process(station(samples=pulse(offset=3.0)))
+    plain, shifted = process(station()), process(station(offset=3.0))
     for expected, found in zip(plain, shifted, strict=True):
         assert_allclose(found.data, expected.data, atol=1e-12)  # rounding of numbers near 3
 
 
 def test_the_result_is_proportional_to_the_motion():
-    single, double = process(station()), process(station(samples=-2 * pulse()))
+    single, double = process(station()), process(station(factor=-2))
     for expected, found in zip(single, double, strict=True):
         assert_allclose(found.data, -2 * expected.data, atol=1e-12)
 

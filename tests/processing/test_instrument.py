@@ -107,7 +107,8 @@ def test_a_raw_record_goes_before_the_same_record_processed_by_others(record):
 def test_sensors_of_a_building_are_separate(record):
     floors = Stream()
     for seed, floor in enumerate(("01", "02")):
-        floors += Stream([record(code, seed, location=floor) for code in ("HNE", "HNN")])
+        floors += record("HNE", seed, location=floor)
+        floors += record("HNN", seed + 2, location=floor)
     instruments, rejected = process_instruments(floors, SETTINGS)
     assert rejected == ()
     # both horizontals of a floor, floor by floor

@@ -77,9 +77,27 @@ def test_a_velocity_sensor_gives_acceleration():
     rate = 2j * np.pi * np.fft.rfftfreq(velocity.size, 1 / RATE)
     sensor = rate**2 / (rate**2 + 1.4 * CORNER * rate + CORNER**2)
     recorded = np.fft.irfft(np.fft.rfft(velocity) * sensor, velocity.size)
-    out = in_acceleration(counts(GAIN * recorded, response=response("M/S")), TOLERANCE)[0]
+    out = in_acceleration(
+        counts(GAIN * recorded, response=response("M/S"), channel="HHE"), TOLERANCE
+    )[0]
     # np.gradient is off by (2 pi f dt)^2 / 6: 0.07 % at 1 Hz, 0.2 % at the pulse's upper end
     assert_allclose(out.data, acceleration, atol=2e-3 * acceleration.max())
+
+
+def test_the_response_of_a_velocity_sensor_is_none_of_an_accelerometer():
+    # M/S in place of M/S**2: the samples would be differentiated, 31 times too large at 5 Hz
+    wrong = counts(GAIN * np.ones(1000), response=response("M/S"))
+    with pytest.raises(RecordRejected, match=r"falls 5 times.*M/S in place of M/S\*\*2"):
+        in_acceleration(wrong, TOLERANCE)
+
+
+def test_an_accelerometer_may_be_described_by_velocity():
+    # A zero at the origin makes the response to acceleration flat, whatever the unit in the file
+    flat = response("M/S")
+    flat.response_stages[0].zeros, flat.response_stages[0].poles = [0j], [-6283.0 + 0j]
+    acceleration, _ = motion()
+    given = counts(GAIN * acceleration, response=flat)
+    assert in_acceleration(given, TOLERANCE)[0].stats.units == "m/s2"
 
 
 def test_an_overall_sensitivity_divides():
@@ -153,7 +171,8 @@ def test_an_hour_of_zeros_behind_a_long_record_is_enough(monkeypatch):
     ground = np.random.default_rng(2).normal(size=count) * np.exp(
         -(((np.arange(count) - 0.9 * count) / 500) ** 2)
     )
-    stream = counts(GAIN * ground, response=response("M/S"), sampling_rate=rate)
+    sensor = {"response": response("M/S"), "channel": "HHE"}
+    stream = counts(GAIN * ground, sampling_rate=rate, **sensor)
     assert count / rate > LONGEST_PAD
     found = in_acceleration(stream, TOLERANCE)[0].data
     monkeypatch.setattr(instrument_response, "LONGEST_PAD", count / rate)

@@ -134,6 +134,7 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     # As if it followed a header
     lines = np.arange(2, len(table) + 2)
     known = {name: table[name] for name in table if name in COLUMNS}
+    # Values for the account; the checks read the cells themselves, with their notes
     numbers = {name: cells for name, cells in known.items() if COLUMNS[name].dtype != "str"}
     texts = {name: cells.astype(str).mask(cells.isna()) for name, cells in known.items()}
     cells = pd.DataFrame(texts | read_columns(numbers) | {IDENTIFIER: row_names(table, lines)})

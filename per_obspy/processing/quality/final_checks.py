@@ -1,4 +1,4 @@
-"""Checks that velocity and displacement of a processed record come to rest."""
+"""Checks of a processed record: its velocity, and that velocity and displacement come to rest."""
 
 from collections.abc import Iterator
 
@@ -9,6 +9,10 @@ from scipy.integrate import cumulative_trapezoid
 from per_obspy.config import Checks
 from per_obspy.processing.notes import copied, noted
 from per_obspy.processing.quality.findings import Finding, above
+from per_obspy.processing.quality.physical_limits import velocity_findings
+
+#: Checks of whether the motion comes to rest: only warnings where others have processed a record.
+AT_REST = ("final_velocity", "final_displacement", "baseline_shift")
 
 #: Quantity -> its integral and the unit of that.
 INTEGRALS = {"acceleration": ("velocity", "m/s"), "velocity": ("displacement", "m")}
@@ -39,9 +43,10 @@ def integrated(stream: Stream) -> Stream:
 
 def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     """
-    Yield findings where velocity or displacement does not come to rest, pads included.
+    Yield findings of a velocity that no ground has, and of motion that does not come to rest.
 
-    A residual velocity before the filter is a finding too.
+    Velocity and displacement come to rest with the pads. A residual velocity before the filter is
+    a finding too.
 
     Parameters
     ----------
@@ -56,6 +61,8 @@ def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     """
     velocity = integrated(Stream([trace]))
     displacement = integrated(velocity)[0].data
+    peak_velocity = float(np.abs(velocity[0].data).max())
+    yield from velocity_findings(trace, peak_velocity, checks)
     # Last value over the largest
     motions = {"final_velocity": velocity[0].data, "final_displacement": displacement}
     for name, motion in motions.items():
@@ -63,7 +70,7 @@ def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         ratio = float(abs(motion[-1]) / peak) if peak else 0.0
         meaning = f"{name.replace('_', ' ')} over its peak:"
         yield from above(name, getattr(checks, name), ratio, meaning)
-    yield from _shift_findings(trace, float(np.abs(velocity[0].data).max()), checks)
+    yield from _shift_findings(trace, peak_velocity, checks)
 
 
 def _shift_findings(trace: Trace, peak: float, checks: Checks) -> Iterator[Finding]:

@@ -6,8 +6,20 @@ from per_obspy.constants import UNSET_DAYS
 from per_obspy.processing.filter.corners import ASSUMED_REASONS, SHIFTED_BASELINE
 from per_obspy.processing.notes import copied_trace, remembered
 
-#: Checks that have a flag of their own.
-NAMED_CHECKS = ("baseline_shift", "second_event")
+#: Flag -> the checks that raise it where they warn; others raise ``record_warning``.
+FLAGGED_CHECKS = {
+    "baseline_shift": ("baseline_shift",),
+    "second_event": ("second_event",),
+    "clipped": ("clipped_run", "pinned", "saturation", "possible_saturation"),
+    "wrapped": ("wrapped",),
+    "filled": ("filled", "dropout"),
+    "implausible_record": (
+        "sampling_interval", "channel_rate", "outlier", "weak_component", "copied_component",
+        "late_component", "exchanged_component", "unusual_acceleration", "impossible_acceleration",
+        "unusual_velocity", "impossible_velocity", "weak_motion", "velocity_time",
+    ),
+}  # fmt: skip
+FLAG_OF_CHECK = {check: flag for flag, checks in FLAGGED_CHECKS.items() for check in checks}
 
 #: Flags of what the record is, whatever its checks found, with the texts of their warnings.
 KINDS = {
@@ -33,9 +45,10 @@ def flags_noted(stream: Stream) -> Stream:
     -------
     obspy Stream
         ``stats.per_obspy.record_flags`` of a record may hold ``baseline_shift``,
-        ``second_event``, ``assumed_corners``, ``record_warning`` (another check that warns),
-        ``digitised``, ``undated`` and ``contradicting_coordinates``; it is missing where there is
-        none. The last three are in ``warnings`` too. Flags of an earlier processing stay.
+        ``second_event``, ``clipped``, ``wrapped``, ``filled``, ``implausible_record``,
+        ``assumed_corners``, ``record_warning`` (another check that warns), ``digitised``,
+        ``undated`` and ``contradicting_coordinates``; it is missing where there is none. The last
+        three are in ``warnings`` too. Flags of an earlier processing stay.
     """
     out = Stream()
     for trace in stream:
@@ -54,7 +67,7 @@ def record_flags(trace: Trace) -> list[str]:
     # Flags of an earlier processing, and the checks that warn
     flags = set(known.get("record_flags", "").split())
     for check in known.get("failed_checks", "").split():
-        flags.add(check if check in NAMED_CHECKS else "record_warning")
+        flags.add(FLAG_OF_CHECK.get(check, "record_warning"))
     # Corners that neither the noise nor a header gives, or that a shifted baseline asks for
     reasons = [str(known.get(name, "")) for name in ("highpass_source", "lowpass_source")]
     for reason in reasons:

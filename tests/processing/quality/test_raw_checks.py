@@ -1,13 +1,16 @@
 import numpy as np
 import pytest
-from obspy import Stream, Trace
+from obspy import Trace
 
 from per_obspy.config import Checks
 from per_obspy.processing.quality.raw_checks import (
     header_findings,
     later_event,
     longest_extreme_run,
-    outlier_findings,
+    longest_fill,
+    overflow_roughness,
+    piled_samples,
+    pinned_samples,
     raw_findings,
 )
 
@@ -143,23 +146,109 @@ def test_the_run_at_an_extreme_does_not_count_equal_samples_elsewhere():
     assert longest_extreme_run(np.array([0, 0, 0, 0, 1, -1, -1, 0.5])) == 2
 
 
-def instrument(*factors):
-    rng = np.random.default_rng(11)
-    stream = Stream()
-    for letter, factor in zip("ENZ", factors, strict=False):
-        stream += Trace(factor * rng.normal(size=1000), {"channel": f"HN{letter}"})
-    return stream
+@pytest.mark.parametrize("seed", range(4))
+def test_a_limit_below_noise_is_found(earthquake, seed):
+    x = earthquake(seed, shaking=30.0)
+    limit = 0.5 * np.abs(x).max()
+    noise = 0.005 * limit * np.random.default_rng(seed).normal(size=x.size)
+    # Of motion that is not clipped there are fewer samples near the peak than below it
+    assert piled_samples(x) == 0.0
+    assert piled_samples(np.clip(x, -limit, limit) + noise) > 1.0
 
 
-def test_a_component_several_times_both_others_is_found():
-    # would catch the finding given to another component
-    (trace_id, (finding,)), *others = outlier_findings(instrument(1, 10, 1), Checks()).items()
-    assert (trace_id, finding.check, others) == ("...HNN", "outlier", [])
-    assert not any(outlier_findings(instrument(1, 3, 1), Checks()).values())
+def test_a_saturated_sensor_is_found_at_unequal_samples():
+    # The plateaus of a broadband sensor sag: no two samples are equal
+    time = np.arange(12_000) / RATE
+    motion = 3 * np.sin(2 * np.pi * 0.3 * time) * np.exp(-(((time - 60) / 25) ** 2))
+    sagging = np.clip(motion, -1, 1) * (1 - 0.002 * np.sin(time))
+    trace = recorded(np.round(sagging, 7))
+    assert longest_extreme_run(trace.data) == 1
+    assert checks_that_fail(trace) >= {"saturation"}
 
 
-def test_of_two_components_none_is_an_outlier():
-    assert outlier_findings(instrument(1, 10), Checks()) == {}
+def test_a_single_flat_top_is_ground_motion():
+    # Far from the fault a pulse of seconds has a flat top
+    time = np.arange(4000) / RATE
+    assert piled_samples(np.exp(-(((time - 20) / 3) ** 4)) + 0.1 * np.sin(9 * time)) == 0.0
+
+
+@pytest.mark.parametrize("share", [0.9, 0.95])
+def test_few_samples_equal_to_an_extreme_are_clipped(earthquake, share):
+    x = recorded(earthquake()).data
+    limit = np.floor(share * np.abs(x - 1234).max())
+    clipped_x = np.clip(x - 1234, -limit, limit)
+    count = max(np.count_nonzero(clipped_x == limit), np.count_nonzero(clipped_x == -limit))
+    assert pinned_samples(x) == 1
+    assert pinned_samples(clipped_x) == (count if count >= 3 else 1)
+
+
+@pytest.mark.parametrize("levels", [20, 100])
+def test_repeated_values_of_coarse_recorders_are_not_pinned(earthquake, levels):
+    x = earthquake()
+    assert pinned_samples(np.round(x / np.abs(x).max() * levels)) < 3
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_an_overflow_is_found_by_its_name(earthquake, seed, share):
+    x = np.round(GAIN * earthquake(seed))
+    limit = np.floor(share * np.abs(x).max())
+    overflowed = (x + limit) % (2 * limit) - limit
+    trace = Trace(overflowed, {"sampling_rate": RATE, "channel": "HNE"})
+    assert overflow_roughness(x) > 0.4
+    assert "wrapped" in checks_that_fail(trace)
+
+
+def test_steps_across_the_range_of_noise_are_no_overflow():
+    # Motion near the Nyquist frequency, as of simulated records at 50 Hz: 1 500 seeds gave 0.41
+    rng = np.random.default_rng(1)
+    time = np.arange(4000) / 50.0
+    for _ in range(50):
+        x = rng.normal(size=4000) * np.exp(-(((time - 40) / rng.uniform(2, 10)) ** 2))
+        assert overflow_roughness(x) > Checks().wrapped.threshold
+
+
+def test_a_spike_is_no_overflow(earthquake):
+    assert "wrapped" not in checks_that_fail(recorded(spiked(earthquake())))
+
+
+def zeros(x, first, last):
+    x[first:last] = 0
+
+
+def last_value(x, first, last):
+    x[first:last] = x[first - 1]
+
+
+def line(x, first, last):
+    x[first:last] = np.round(np.linspace(x[first - 1], x[last], last - first + 2)[1:-1])
+
+
+@pytest.mark.parametrize("fill", [zeros, last_value, line])
+@pytest.mark.parametrize("seconds", [0.2, 0.4, 1.0])
+def test_a_filled_gap_at_the_peak_is_found_with_its_length(earthquake, fill, seconds):
+    trace = recorded(earthquake())
+    peak = int(np.abs(trace.data - 1234).argmax())
+    half = round(seconds * RATE / 2)
+    fill(trace.data, peak - half, peak + half)
+    count = longest_fill(trace.data, 1 / RATE)
+    # Both ends of an interpolation lie on its line
+    assert count == pytest.approx(2 * half, abs=2)
+    assert "filled" in checks_that_fail(trace)
+
+
+def test_a_gap_in_the_quiet_is_none_of_the_shaking(earthquake):
+    trace = recorded(earthquake())
+    zeros(trace.data, 500, 540)
+    assert longest_fill(trace.data, 1 / RATE) == 0
+
+
+def test_straight_lines_of_film_are_not_filled(earthquake):
+    # Film is digitised at uneven points and interpolated between them
+    x = earthquake()
+    points = np.sort(np.random.default_rng(3).choice(x.size, x.size // 8, replace=False))
+    film = np.interp(np.arange(x.size), points, x[points])
+    assert longest_fill(film, 1 / RATE) == 0
 
 
 @pytest.mark.parametrize(

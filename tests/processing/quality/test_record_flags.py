@@ -25,6 +25,8 @@ def _trace(start="2019-07-06T03:19:53", **known):
         ({"highpass_source": "noise", "lowpass_source": "0.75 Nyquist"}, []),
         ({"failed_checks": "baseline_shift second_event"}, ["baseline_shift", "second_event"]),
         ({"failed_checks": "late_trigger cut_off"}, ["record_warning"]),
+        ({"failed_checks": "possible_saturation dropout"}, ["clipped", "filled"]),
+        ({"failed_checks": "wrapped channel_rate weak_motion"}, ["implausible_record", "wrapped"]),
         ({"highpass_source": fallback_highpass(6.0, TABLE, 0.08).reason}, ["assumed_corners"]),
         ({"highpass_source": fallback_highpass(None, TABLE, 0.08).reason}, ["assumed_corners"]),
         (

@@ -375,6 +375,18 @@ SPANISH: dict[str, str] = {
         "la línea base del registro se desplazó durante el sismo: los períodos largos son dudosos"
     ),
     "flag_second_event": "el registro contiene otro evento: su demanda puede ser la de ambos",
+    "flag_clipped": (
+        "el registro puede haber alcanzado el límite del sensor o del registrador: el movimiento "
+        "puede haber sido mayor"
+    ),
+    "flag_wrapped": "el contador del registro se desbordó: los máximos siguen en su otro extremo",
+    "flag_filled": (
+        "un vacío del registro fue rellenado durante el sismo: allí se desconoce el movimiento"
+    ),
+    "flag_implausible_record": (
+        "la unidad, el intervalo o las componentes del registro contradicen lo que el suelo puede "
+        "hacer, o se contradicen entre sí: vea stations.csv"
+    ),
     "flag_assumed_corners": (
         "una frecuencia de corte del registro es supuesta: ni el ruido ni el encabezado la dan"
     ),
@@ -447,6 +459,10 @@ SPANISH: dict[str, str] = {
     "flagname_contradicting_coordinates": "coordenadas contradictorias",
     "flagname_baseline_shift": "desplazamiento de línea base",
     "flagname_second_event": "segundo evento",
+    "flagname_clipped": "saturado",
+    "flagname_wrapped": "contador desbordado",
+    "flagname_filled": "vacío rellenado",
+    "flagname_implausible_record": "registro inverosímil",
     "flagname_assumed_corners": "cortes supuestos",
     "flagname_digitised": "digitalizado",
     "flagname_undated": "sin fecha",
