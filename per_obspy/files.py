@@ -125,6 +125,9 @@ def written_whole(path: Path) -> Iterator[Path]:
     try:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
+            # HDF5 takes a name that is too long for a missing right
+            with suppress(FileNotFoundError):
+                part.lstat()
             yield part
             # Readers see the old file or the whole new one, never a half, also after a power cut
             _sync(part)

@@ -188,7 +188,7 @@ def test_nothing_in_reach_exits_with_3(call, configuration):
     (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{far}\n")
     code, _, err = call("run", configuration)
     assert code == 3
-    assert "rejected.csv, first pair a: nearest station" in err.splitlines()[-1]
+    assert "rejected.csv; first pair a: nearest station" in err.splitlines()[-1]
     rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
     assert rejected[rejected["kind"] == "pair"]["reasons"].str.contains("m away").all()
 

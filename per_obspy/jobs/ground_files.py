@@ -52,7 +52,7 @@ class StationFile(NamedTuple):
     site_class: str
     shard: Path
     hash: str
-    flags: str
+    flags: str = ""
 
 
 class GroundFiles(NamedTuple):

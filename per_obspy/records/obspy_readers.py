@@ -198,16 +198,15 @@ def _called(
     try:
         name = options.pop("format", None) or _format(kind, content)
         # Samples in a second file are found by the path of the first only
-        if name is None and beside:
-            name = _detected(kind, str(source), _TWO_FILES)
-        if name is None or name not in FORMATS[kind]:
+        name = name or (_detected(kind, str(source), _TWO_FILES) if beside else None)
+        if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
         # Faults that ObsPy would not notice, or not survive
         if require := _CHECKS.get(name):
             require(content, str(source))
         if name in _HERE:
-            file = _File(content, str(source))
-            return reader(file, format=name, check_compression=False, **options)
+            options |= {"format": name, "check_compression": False}
+            return reader(_File(content, str(source)), **options)
         place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
         return _value_apart(kind, content, place, name, options)
     except BeyondLimits as error:
@@ -295,5 +294,5 @@ def _has_plain_numbers(content: bytes) -> bool:
 
 def _reason(error: Exception) -> str:
     """Return the message of an error on one line; an object in memory is the content."""
-    message = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "the content", str(error))
+    message = re.sub(r"'?<[\w.]+ object at 0x[0-9a-f]+>'?", "the content", str(error))
     return f"{type(error).__name__}: {' '.join(message.split())}"

@@ -74,7 +74,7 @@ def folder(tmp_path_factory):
     header = "pair_id,longitude_1,latitude_1,longitude_2,latitude_2,height_1,height_2,gap"
     (folder / "pairs.csv").write_text("\n".join([header, *rows]) + "\n")
     # units, samples of another station, places
-    _times(records, LARGE, 981.0)
+    _times(records, LARGE, 1 / 981.0)
     _times(records, SMALL, 0.01)
     stream = obspy.read(records / f"{ORIGINAL}.mseed")
     for trace in stream:
@@ -127,7 +127,7 @@ def test_wrong_stations_are_flagged_or_rejected_with_figures(finished):
 def test_rejected_stations_are_rows_with_the_way_to_lift_them(finished):
     rejected = pd.read_csv(finished.folder / "rejected.csv").set_index("name")["reasons"]
     for name, part in {
-        LARGE: "as by a wrong unit (cm/s2 taken for g)",
+        LARGE: "as by a wrong unit (g taken for cm/s2)",
         LOST_SIGN: "km from it, as by a lost sign",
         EMPTY: "coordinates 0, 0 are an empty field",
     }.items():

@@ -32,7 +32,6 @@ GOOD = {"pair_id": "P", "gap": 0.1, "height_1": 9.0, "height_2": 9.0, **PLACE}
     ("change", "expected"),
     [
         ({"height_1": np.nan}, "no height, storeys or period"),
-        ({"gap": "x"}, "gap: no number"),
         ({"gap": -0.1}, "gap: out of range"),
         ({"longitude_2": np.nan}, "longitude: empty"),
         ({"longitude_1": 2345678.0}, "longitude: out of range"),
@@ -41,7 +40,6 @@ GOOD = {"pair_id": "P", "gap": 0.1, "height_1": 9.0, "height_2": 9.0, **PLACE}
         ({"storeys_1": 30.0}, "height and storeys disagree"),
         ({"contact_height": 12.0}, "contact height above the lower building"),
         ({"building_id_1": "B", "building_id_2": "B"}, "a building paired with itself"),
-        ({"position": "roof"}, "position: unknown word"),
     ],
 )
 def test_reasons_of_the_checks_have_kinds_without_values(change, expected):

@@ -163,14 +163,14 @@ def _limit_findings(samples: FloatArray, checks: Checks) -> Iterator[Finding]:
     """Yield the failed checks of a recorder or sensor that reached the limit of its range."""
     run, pinned = longest_extreme_run(samples), pinned_samples(samples)
     if run >= checks.clipped_run.threshold:
-        reason = f"{CLIPPED}: {run} equal samples at an extreme"
+        reason = f"clipped: {run} equal samples at an extreme"
         yield Finding("clipped_run", checks.clipped_run.level, reason)
     elif pinned >= checks.pinned.threshold:
-        reason = f"{CLIPPED}: {pinned} samples are equal to an extreme"
+        reason = f"clipped: {pinned} samples are equal to an extreme"
         yield Finding("pinned", checks.pinned.level, reason)
     # Below full scale, with noise on top
     pile = piled_samples(samples)
-    meaning = f"{CLIPPED}: samples within 5 % of an extreme over those 5 to 15 % below it:"
+    meaning = "clipped: samples within 5 % of an extreme over those 5 to 15 % below it:"
     saturated = above("saturation", checks.saturation, pile, meaning)
     yield from saturated or above("possible_saturation", checks.possible_saturation, pile, meaning)
 

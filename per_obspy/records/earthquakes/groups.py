@@ -240,9 +240,9 @@ def differ_by_clocks(groups: Sequence[EventGroup], screened: EventGroup) -> list
 
 
 def joining_gap(groups: Sequence[EventGroup]) -> float:
-    """Return the gap, s, with which groups are one: up to the next 100 s."""
+    """Return the gap, s, with which groups are one: up to the next 100 s; 0 without dates."""
     starts = [record.start for group in groups for record in group.records if record.is_dated]
-    return 100.0 * math.ceil(float(max(starts) - min(starts)) / 100.0)
+    return 100.0 * math.ceil(float(max(starts) - min(starts)) / 100.0) if starts else 0.0
 
 
 def _started_together(records: Sequence[RecordSpan], gap: float) -> list[list[RecordSpan]]:
