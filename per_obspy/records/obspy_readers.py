@@ -202,8 +202,8 @@ def _called(
         if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
         # Faults that ObsPy would not notice, or not survive
-        if require := _CHECKS.get(name):
-            require(content, str(source))
+        if name in _CHECKS:
+            _CHECKS[name](content, str(source))
         if name in _HERE:
             options |= {"format": name, "check_compression": False}
             return reader(_File(content, str(source)), **options)
