@@ -543,7 +543,7 @@ def read_columns(
             notes.append(wrong)
         else:
             numbers[name] = read_numbers(name, cells, form)
-            read[name] = pd.Series(numbers[name].values)
+            read[name] = pd.Series(_within_half_turn(name, numbers[name].values))
             notes.append(numbers[name].notes)
     # Values that rest on several columns
     for group in ONE_OF:
@@ -551,6 +551,13 @@ def read_columns(
     if "gap" in numbers and (deviations := numbers["gap"].deviations).any():
         read["gap_std"] = _joined(read.get("gap_std"), deviations)
     return _with_notes(read, notes)
+
+
+def _within_half_turn(name: str, values: FloatArray) -> FloatArray:
+    """Return longitudes of the convention from 0 to 360 degrees as those from -180 to 180."""
+    if bare_name(name) != "longitude":
+        return values
+    return np.where((values > 180.0) & (values <= 360.0), values - 360.0, values)
 
 
 def _joined(given: pd.Series | None, deviations: FloatArray) -> pd.Series:

@@ -35,6 +35,16 @@ def test_a_good_row_in_the_order_of_the_schema():
     assert list(pairs.columns) == [*(name for name in COLUMNS if name in row), "extra"]
 
 
+@pytest.mark.parametrize("east", [179.99995, 180.0, 180.02, 359.9])
+def test_longitudes_from_0_to_360_degrees_are_places(east):
+    row = _row(longitude_1=east, longitude_2=east + 1e-4)
+    pairs = checked_pairs(pd.DataFrame([row]), "pairs.csv")
+    for name, given in (("longitude_1", east), ("longitude_2", east + 1e-4)):
+        # Degrees of 360 are rounded to 6e-14
+        expected = given if given <= 180.0 else given - 360.0
+        assert pairs[name][0] == pytest.approx(expected, abs=1e-12)
+
+
 UNIT_OF_GAP = "(given in millimetres or centimetres by mistake?)"
 FRACTION = "(a fraction is expected, not per cent)"
 
