@@ -250,6 +250,25 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
         yield Path(name)
 
 
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """
+    Yield a folder where the system keeps temporary files; it is removed afterwards.
+
+    Raises
+    ------
+    WriteError
+        If no place for temporary files can be written.
+    """
+    try:
+        folder = TemporaryDirectory(prefix="per_obspy_")
+    except FileNotFoundError as error:
+        problem = "none can be written: free the disk, or name another folder in TMPDIR"
+        raise WriteError("folders of temporary files", problem) from error
+    with folder as name:
+        yield Path(name)
+
+
 def _part_name(stem: str, suffix: str) -> str:
     """Return the name of a part file of this process; it ends with the suffix."""
     return f".{stem}.{os.getpid()}@{_MACHINE}.part{suffix}"

@@ -5,6 +5,7 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -197,3 +198,11 @@ def test_file_and_folder_are_on_the_disk_around_the_renaming(tmp_path, monkeypat
     with written_whole(tmp_path / "table.csv") as part:
         part.write_text("gap")
     assert steps == [(stat.S_IFREG, False), (stat.S_IFDIR, True)]
+
+
+def test_no_place_for_temporary_files_is_no_fault_of_a_file(monkeypatch, tmp_path):
+    # tempfile says that a file is missing, which a reader would take for a damaged one
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "none")])
+    with pytest.raises(WriteError, match="TMPDIR"), files.scratch_folder():
+        pass

@@ -12,7 +12,6 @@ import glob
 import gzip
 import re
 import tarfile
-import tempfile
 import warnings
 import zipfile
 import zlib
@@ -26,7 +25,7 @@ from obspy.core.util.base import ENTRY_POINTS
 from obspy.core.util.misc import buffered_load_entry_point
 
 from per_obspy.errors import PerError, RecordRejected
-from per_obspy.files import writing
+from per_obspy.files import scratch_folder, writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
@@ -252,11 +251,11 @@ def _format(kind: str, content: bytes) -> str | None:
         return _detected(kind, BytesIO(content), FORMATS[kind])
     except TypeError:
         # Some formats are recognised in named files only
-        with tempfile.NamedTemporaryFile(prefix="per_obspy-", suffix=".tmp") as file:
-            with writing(Path(file.name)):
-                file.write(content)
-                file.flush()
-            return _detected(kind, file.name, FORMATS[kind])
+        with scratch_folder() as folder:
+            file = folder / "record"
+            with writing(file):
+                file.write_bytes(content)
+            return _detected(kind, str(file), FORMATS[kind])
 
 
 def _detected(kind: str, file: BytesIO | str, allowed: Collection[str]) -> str | None:

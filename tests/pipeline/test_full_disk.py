@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from fdsn_server import serving
 
+from per_obspy import reader_process
 from per_obspy.config import Run, Scenario, load
 from per_obspy.errors import WriteError
 from per_obspy.files import is_part
@@ -60,6 +61,8 @@ def no_room(size: int):
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        # A process that was started meanwhile has the limit for ever
+        reader_process._reader.end()
 
 
 pytestmark = pytest.mark.usefixtures("plain_reports")

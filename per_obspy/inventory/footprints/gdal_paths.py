@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+
+from per_obspy.files import scratch_folder
 
 
 @contextmanager
@@ -30,8 +31,7 @@ def literal_path(path: Path) -> Iterator[Path]:
     if vsi_path(str(place)) == str(place) and not str(place).startswith("/vsi"):
         yield place
         return
-    with TemporaryDirectory(prefix="per_obspy_") as name:
-        plain = Path(name)
+    with scratch_folder() as plain:
         # A file that is written is reached by its folder, as its journal lies there too
         if not place.exists():
             (plain / "folder").symlink_to(place.parent, target_is_directory=True)

@@ -13,7 +13,6 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +22,8 @@ import pyarrow.parquet
 import shapely
 from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError, Rejection, shortened
-from per_obspy.files import unreadable_reason
+from per_obspy.errors import CatalogError, Rejection, TryLater, shortened
+from per_obspy.files import scratch_folder, unreadable_reason, writing
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.footprints.building_lists import read_list
 from per_obspy.inventory.footprints.gdal_paths import literal_path
@@ -166,6 +165,8 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
         ):
             name = _layer_name(file, pyogrio.list_layers(path), layer, views)
             meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False)
+    except TryLater:
+        raise
     except (
         pyogrio.errors.DataSourceError,
         pyogrio.errors.DataLayerError,
@@ -214,17 +215,19 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
     if file.suffix.lower() != ".gpkg":
         yield file, set()
         return
-    # Only a package that has some is copied
-    with TemporaryDirectory(prefix="per_obspy_") as folder:
-        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
-            foreign = _views(package)
-            _require_stored(file, package, foreign)
-            copy = Path(folder, "layer.gpkg") if foreign else file
-            if foreign:
-                with closing(sqlite3.connect(copy)) as target:
+    with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
+        foreign = _views(package)
+        _require_stored(file, package, foreign)
+        # Only a package that has some is copied
+        if foreign:
+            with scratch_folder() as folder:
+                copy = folder / "layer.gpkg"
+                with writing(copy), closing(sqlite3.connect(copy)) as target:
                     package.backup(target)
                     _remove(target, foreign)
-        yield copy, foreign
+                yield copy, foreign
+            return
+    yield file, foreign
 
 
 def _views(package: sqlite3.Connection) -> set[str]:

@@ -5,9 +5,9 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from per_obspy.errors import CatalogError
+from per_obspy.files import scratch_folder
 from per_obspy.inventory.importers.asset_json import is_asset_json, read_asset_json
 from per_obspy.inventory.importers.citygml import read_citygml
 from per_obspy.inventory.importers.csv_buildings import read_csv_buildings
@@ -84,8 +84,8 @@ def _first_character(file: Path) -> bytes:
 @contextmanager
 def _unpacked(file: Path) -> Iterator[Path]:
     """Yield the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
-    with TemporaryDirectory(prefix="per_obspy_") as folder:
-        plain = Path(folder, file.stem)
+    with scratch_folder() as folder:
+        plain = folder / file.stem
         # Block by block, up to the limit
         try:
             with gzip.open(file) as packed, plain.open("wb") as copy:
