@@ -49,6 +49,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "maule2010": ("run workflows/maule2010.toml",),
     "afad2023": ("run workflows/afad2023.toml",),
     "design": ("screen workflows/design.toml",),
+    # An earthquake with several revisions and killed processes
+    "watch": (f"{CHECKOUT}/workflows/rehearsal.py output/watch",),
     "shakemap": (
         f"run {DATA}/field/shakemap-antimeridian/anti.xml "
         f"{DATA}/field/shakemap-antimeridian/panti.csv -o output/shakemap",
@@ -101,8 +103,9 @@ def make(folder: Path, names: list[str]) -> None:
         codes, seconds, memory = [], 0.0, 0
         for command in RUNS[name]:
             with (folder / f"{name}.log").open("a", encoding="utf-8") as log:
+                script = command.split()[0].endswith(".py")
                 process = subprocess.Popen(
-                    [sys.executable, "-m", "per_obspy", *command.split()],
+                    [sys.executable, *([] if script else ["-m", "per_obspy"]), *command.split()],
                     cwd=folder, stdout=log, stderr=log,
                 )  # fmt: skip
                 _, status, usage = os.wait4(process.pid, 0)
@@ -209,19 +212,22 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     maker = commands.add_parser("make")
     maker.add_argument("folder", type=Path)
-    maker.add_argument("runs", nargs="*", default=list(RUNS), choices=list(RUNS))
+    maker.add_argument("runs", nargs="*", metavar="RUN", help=f"of {', '.join(RUNS)}")
     comparison = commands.add_parser("compare")
     comparison.add_argument("old", type=Path)
     comparison.add_argument("new", type=Path)
     comparison.add_argument("--tolerance", type=float, default=1e-12)
     arguments = parser.parse_args()
     if arguments.command == "make":
+        names = arguments.runs or list(RUNS)
+        if unknown := sorted(set(names) - set(RUNS)):
+            parser.error(f"no such run: {', '.join(unknown)}, one of {', '.join(RUNS)}")
         arguments.folder.mkdir(parents=True, exist_ok=True)
-        real = [name for name in arguments.runs if str(DATA) in "".join(RUNS[name])]
+        real = [name for name in names if str(DATA) in "".join(RUNS[name])]
         absent = [] if DATA.is_dir() else real
         if absent:
             print(f"left out, no real data at {DATA}: {', '.join(absent)}")
-        make(arguments.folder, [name for name in arguments.runs if name not in absent])
+        make(arguments.folder, [name for name in names if name not in absent])
     elif not compare(arguments.old, arguments.new, arguments.tolerance):
         sys.exit(1)
 
