@@ -12,8 +12,6 @@ azimuthal_per_spectrum
     Compute the pseudo energy radius spectrum along each of many horizontal azimuths.
 bilinear_response
     Compute the response of a bilinear oscillator, exact between samples and at its events.
-constant_ductility_spectra
-    Compute inelastic spectra of oscillators just strong enough not to exceed a ductility.
 constant_yield_spectra
     Compute inelastic spectra of oscillators of given strength.
 per_spectrum
@@ -73,20 +71,12 @@ record_correlation
 
 **Exact histories**
 
-azimuthal_gap_surface
-    Compute the largest relative displacement of every pair of periods over all azimuths.
-bridge_history
-    Compute the exact history of bridge decks in series, with unseating.
-critical_gap_surface
-    Compute the largest ``|u1 - u2|`` of a record over a grid of two periods.
 hertz_damp_history
     Compute the history of two linear structures with a Hertz-damp contact.
 kelvin_voigt_history
     Compute the history of two structures that hit each other through a spring and a dashpot.
 linked_history
     Compute the history of two structures joined by an elastic, viscous or bilinear link.
-moat_history
-    Compute the exact history of a building between two moat walls.
 pounding_histories
     Compute the maxima of the exact pounding histories of many pairs.
 pounding_history
@@ -106,14 +96,8 @@ kelvin_voigt_restitution
     Compute the restitution of a contact by a spring and a parallel dashpot.
 mahmoud_jankowski_damping
     Compute the damping of a linear viscoelastic contact that is damped while approaching only.
-optimal_damping_split
-    Find the split of added damping between both structures that needs the least in sum.
 required_gap
     Find the least gap from which on the single hit amplifies no structure beyond a target.
-required_link_damping
-    Find the least damping of a viscous link with which two linear structures stay apart.
-required_link_stiffness
-    Find the least stiffness of an elastic link with which two linear structures stay apart.
 required_restitution
     Compute the largest restitution for which no structure is amplified beyond a target.
 supplemental_damping

@@ -22,16 +22,12 @@ from .pounding.dispersion import combined_dispersion as combined_dispersion
 from .pounding.dispersion import combined_dispersion_correlation as combined_dispersion_correlation
 from .pounding.dispersion import lognormal_dispersion as lognormal_dispersion
 from .pounding.dispersion import period_dispersion as period_dispersion
-from .pounding.history.gap_surface import azimuthal_gap_surface as azimuthal_gap_surface
 from .pounding.history.hertz_contact import hertz_damp_history as hertz_damp_history
 from .pounding.history.links import kelvin_voigt_history as kelvin_voigt_history
 from .pounding.history.links import linked_history as linked_history
 from .pounding.history.pair_histories import pounding_histories as pounding_histories
-from .pounding.history.relative import critical_gap_surface as critical_gap_surface
 from .pounding.history.relative import relative_displacement as relative_displacement
 from .pounding.history.row_history import pounding_history as pounding_history
-from .pounding.history.with_walls.bridges import bridge_history as bridge_history
-from .pounding.history.with_walls.moat import moat_history as moat_history
 from .pounding.impact import post_impact_velocities as post_impact_velocities
 from .pounding.impact import transfer_energies as transfer_energies
 from .pounding.mitigation.bumpers import bumper_restitution as bumper_restitution
@@ -40,9 +36,6 @@ from .pounding.mitigation.bumpers import kelvin_voigt_damping as kelvin_voigt_da
 from .pounding.mitigation.bumpers import kelvin_voigt_restitution as kelvin_voigt_restitution
 from .pounding.mitigation.bumpers import mahmoud_jankowski_damping as mahmoud_jankowski_damping
 from .pounding.mitigation.bumpers import required_restitution as required_restitution
-from .pounding.mitigation.required_link import required_link_damping as required_link_damping
-from .pounding.mitigation.required_link import required_link_stiffness as required_link_stiffness
-from .pounding.mitigation.supplemental_damping import optimal_damping_split as optimal_damping_split
 from .pounding.mitigation.supplemental_damping import required_gap as required_gap
 from .pounding.mitigation.supplemental_damping import supplemental_damping as supplemental_damping
 from .pounding.probability import pounding_probability as pounding_probability
@@ -57,7 +50,6 @@ from .screening.risk import risk_table as risk_table
 from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum
 from .spectra.azimuthal import rotd as rotd
 from .spectra.bilinear import bilinear_response as bilinear_response
-from .spectra.bilinear import constant_ductility_spectra as constant_ductility_spectra
 from .spectra.bilinear import constant_yield_spectra as constant_yield_spectra
 from .spectra.elastic import per_spectrum as per_spectrum
 from .spectra.elastic import response_spectra as response_spectra

@@ -34,3 +34,17 @@ impacts.scatter(counted["time"], counted["left"] + 0.5, 300.0 * speed, alpha=0.5
 impacts.set_yticks(place, [f"{period} s" for period in periods])
 impacts.set(xlabel="time (s)", ylabel="building", title="impacts, area by approach velocity")
 plt.show()
+
+# %%
+# A **wall** is a structure of infinite mass that is not driven: the moat of a base-isolated
+# building, or the abutments of a bridge.
+
+wall = per_obspy.Structure(1.0, 0.0, mass=np.inf, participation=0.0)
+isolated = per_obspy.Structure(3.0, 0.1, 1e6)
+moat = per_obspy.pounding_history(
+    motion, scenario.dt, [wall, isolated, wall], gaps=[0.03, 0.04], restitution=0.4
+)
+impacts = moat.impacts["counted"].sum()
+low, high = moat.displacement[1].min(), moat.displacement[1].max()
+print(f"{impacts} impacts on walls 3 cm to the left and 4 cm to the right")
+print(f"it moves from {low:.3f} to {high:.3f} m")

@@ -1,9 +1,8 @@
-"""Bilinear oscillators: histories, and inelastic PER spectra of given strength or ductility."""
+"""Bilinear oscillators: histories, and inelastic PER spectra of given strength."""
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -11,12 +10,6 @@ from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.kernels.oscillator import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
 from per_obspy.spectra.trace_arguments import takes_trace
-
-#: Ratio of neighbouring yield displacements in the search for the largest one that gives a
-#: ductility.
-SCAN_RATIO = 0.97
-#: Yield displacements below this part of the elastic displacement are not tried.
-SMALLEST_YIELD = 1e-4
 
 
 class BilinearResponse(NamedTuple):
@@ -205,76 +198,6 @@ def constant_yield_spectra(
     return _spectra(rows, coefficients.copy())
 
 
-@takes_trace
-def constant_ductility_spectra(
-    acceleration: ArrayLike,
-    dt: float,
-    periods: ArrayLike,
-    damping: float,
-    ductility: float,
-    hardening: float,
-) -> InelasticSpectra:
-    """
-    Compute inelastic spectra of oscillators just strong enough not to exceed a ductility.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) array_like or obspy Trace
-        Ground acceleration, m/s², as for `per_spectrum`.
-    dt : float
-        Time between samples, s; not given with a Trace.
-    periods : (n_periods,) array_like
-        Undamped elastic periods, s.
-    damping, hardening : float
-        As for `bilinear_response`.
-    ductility : float
-        Largest displacement over yield displacement, at least 1.
-
-    Returns
-    -------
-    InelasticSpectra
-        Arrays (n_periods,); NaN where the ductility is not reached down to 1e-4 of the elastic
-        displacement.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, out of range or of the wrong shape, or the ductility is below
-        1.
-
-    Notes
-    -----
-    Several strengths can give the same ductility. The largest is returned: the yield displacement
-    is lowered from the elastic displacement in steps of 3 % until the ductility is exceeded, and
-    the root in that step is found by Brent's method (two roots within one step can be missed).
-
-    References
-    ----------
-    Newmark & Hall (1982), Earthquake spectra and design, for inelastic spectra.
-
-    Examples
-    --------
-    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> spectra = constant_ductility_spectra(pulse, 0.01, [0.5, 1.0], 0.05, 4.0, 0.05)
-    >>> print(spectra.yield_coefficient.round(3), spectra.ductility.round(6))
-    [0.09  0.055] [4. 4.]
-    """
-    record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
-    target = checks.number("ductility", ductility, checks.finite)
-    if target < 1.0:
-        raise ValueError(f"ductility must be at least 1, got {target}")
-    limits = np.array([_largest_yield(record, dt, omega, ratio, alpha, target) for omega in omegas])
-
-    # A ductility that is not reached has no response
-    empty, nan = np.full(record.size, np.nan), np.nan
-    unreached = BilinearResponse(empty, empty, empty, nan, nan, nan, nan, nan, nan)
-    rows = [
-        unreached if np.isnan(limit) else _response(record, dt, omega, ratio, limit, alpha)
-        for omega, limit in zip(omegas, limits, strict=True)
-    ]
-    return _spectra(rows, limits * omegas**2 / STANDARD_GRAVITY)
-
-
 def _hardening(hardening: float) -> float:
     """Check the stiffness after yielding over the elastic one."""
     return checks.number(
@@ -319,29 +242,6 @@ def _response(
         displacement_radius=float(np.sqrt(square)),
         energy_radius=float(np.sqrt(energy)),
     )
-
-
-def _largest_yield(
-    record: FloatArray, dt: float, omega: float, damping: float, hardening: float, ductility: float
-) -> float:
-    """Return the largest yield displacement that gives a ductility, m; NaN if there is none."""
-
-    def excess(limit: float) -> float:
-        return _response(record, dt, omega, damping, limit, hardening).ductility - ductility
-
-    # Ductility 1 is the elastic displacement itself
-    elastic = _response(record, dt, omega, damping, np.inf, hardening).displacement_maximum
-    if ductility == 1.0 or elastic == 0.0:
-        return elastic if elastic > 0.0 else np.nan
-
-    # Lower the yield displacement step by step until the ductility is exceeded
-    stronger = elastic
-    while stronger > SMALLEST_YIELD * elastic:
-        weaker = stronger * SCAN_RATIO
-        if excess(weaker) >= 0.0:
-            return float(brentq(excess, weaker, stronger, xtol=1e-12 * elastic))
-        stronger = weaker
-    return np.nan
 
 
 def _spectra(rows: list[BilinearResponse], coefficients: FloatArray) -> InelasticSpectra:

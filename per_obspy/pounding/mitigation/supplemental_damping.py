@@ -16,9 +16,7 @@ from per_obspy.spectra.elastic import per_spectrum
 from per_obspy.spectra.trace_arguments import takes_trace
 
 STEP = 0.01  # largest step of added damping in the scan: one-sided damping is not monotone
-SPLITS = 21  # shares between only structure 2 and only structure 1 that are tried
 GAPS = 2001  # scanned below the critical gap
-LARGEST_ADDED = 0.4  # damping, where a caller names no other
 
 
 class SupplementalDamping(NamedTuple):
@@ -36,13 +34,6 @@ class SupplementalDamping(NamedTuple):
     robust: bool
 
 
-class DampingSplit(NamedTuple):
-    """Share of structure 1 in the least sum of dampings to add to both, and that sum."""
-
-    share_1: float
-    added: SupplementalDamping
-
-
 @takes_trace
 def supplemental_damping(
     acceleration: ArrayLike,
@@ -54,7 +45,7 @@ def supplemental_damping(
     gap: float,
     share_1: float = 1.0,
     share_2: float = 1.0,
-    largest: float = LARGEST_ADDED,
+    largest: float = 0.4,
 ) -> SupplementalDamping:
     """
     Find the least damping to add to a pair so that its critical gap fits into the gap.
@@ -154,73 +145,6 @@ def _least(
     # Refine in the step before
     damping = brentq(excess, grid[first - 1], grid[first], xtol=1e-12, rtol=1e-12)
     return SupplementalDamping(float(damping), smallest_gap, robust)
-
-
-@takes_trace
-def optimal_damping_split(
-    acceleration: ArrayLike,
-    dt: float,
-    period_1: float,
-    damping_1: float,
-    period_2: float,
-    damping_2: float,
-    gap: float,
-    largest: float = LARGEST_ADDED,
-) -> DampingSplit:
-    """
-    Find the split of added damping between both structures that needs the least in sum.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) array_like or obspy Trace
-        Ground acceleration, m/s².
-    dt : float
-        Sampling interval, s; not given with a Trace.
-    period_1, period_2 : float
-        Undamped periods, s.
-    damping_1, damping_2 : float
-        Dampings now, fractions of critical, dimensionless.
-    gap : float
-        Actual gap, m.
-    largest : float, optional
-        Largest sum to add, dimensionless.
-
-    Returns
-    -------
-    DampingSplit
-        Best of 21 shares from 0 to 1; where none is enough, the one with the least critical gap.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, or a structure would become critically damped.
-
-    See Also
-    --------
-    per_obspy.supplemental_damping : Damping for a given split.
-
-    References
-    ----------
-    Valles-Mattox & Reinhorn (1996), 11WCEE, figure 8, for the damping of a given split.
-
-    Examples
-    --------
-    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> split = optimal_damping_split(pulse, 0.01, 0.9, 0.05, 1.2, 0.05, 0.1)
-    >>> print(f"{split.share_1:.2f} of {split.added.damping:.3f}")
-    0.40 of 0.128
-    """
-    pair = acceleration, dt, period_1, damping_1, period_2, damping_2, gap
-    splits = []
-    for share in np.linspace(0.0, 1.0, SPLITS).tolist():
-        added = supplemental_damping(*pair, share, 1.0 - share, largest)
-        splits.append(DampingSplit(share, added))
-
-    # Least damping, or the least critical gap where no split is enough
-    sufficient = [split for split in splits if not np.isnan(split.added.damping)]
-    if sufficient:
-        return min(sufficient, key=lambda split: split.added.damping)
-    return min(splits, key=lambda split: split.added.smallest_gap)
 
 
 def required_gap(

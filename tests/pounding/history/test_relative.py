@@ -9,7 +9,6 @@ from scipy.signal import cont2discrete, lfilter
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.relative import (
     approach,
-    critical_gap_surface,
     directional_relative_displacement,
     relative_displacement,
 )
@@ -194,19 +193,6 @@ def test_the_exact_history_first_touches_at_the_largest_relative_displacement():
     )
     assert np.all(apart == 0.0)
     assert np.all(touching > 0.0)
-
-
-def test_surface():
-    # mutation: pairs that are equal but for their order mixed up
-    ground = noise(150)
-    periods_1, periods_2 = np.array([0.3, 0.6, 1.0]), np.array([0.6, 0.9])
-    surface = critical_gap_surface(ground, DT, periods_1, periods_2)
-    expected = relative_displacement(ground, DT, periods_1[:, None], 0.05, periods_2, 0.05).largest
-    np.testing.assert_allclose(surface, expected, rtol=1e-12)
-    assert surface[1, 0] == 0.0
-    unlike = critical_gap_surface(ground, DT, periods_1, periods_2, 0.02, 0.1)
-    mirrored = critical_gap_surface(ground, DT, periods_2, periods_1, 0.1, 0.02)
-    np.testing.assert_array_equal(unlike, mirrored.T)
 
 
 @pytest.mark.parametrize(("name", "changed"), [

@@ -235,6 +235,18 @@ class TestContact:
         assert_array_equal(history.displacement[1], 0.0)
         assert history.closure <= 1e-10
 
+    def test_joints_between_abutments_open_by_the_decks_motion(self):
+        # catches: closing taken for opening, a joint at a wall left out
+        wall = Structure(1.0, 0.0, np.inf, participation=0.0)
+        row = [wall, Structure(1.5, 0.05, 4.0), Structure(0.7, 0.05, 2.0), wall]
+        record = shaking()
+        fine = np.interp(np.arange(0, record.size - 1, 1 / 32), np.arange(record.size), record)
+        history = pounding_history(fine, DT / 32, row, 0.02, 0.5)
+        opening = np.diff(history.displacement, axis=0).max(axis=1)
+        assert (history.opening_maxima >= opening).all()
+        # between samples a little more, where impacts end it
+        assert_allclose(history.opening_maxima, opening, rtol=0.01)
+
     def test_heavy_neighbour_is_not_moved(self):
         # catches: impulse shared wrongly; limit of masses
         heavy = pair((1.5, 0.05, 1e-9), (0.6, 0.05, 1.0))

@@ -7,7 +7,6 @@ from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.mitigation.supplemental_damping import (
     _least,
-    optimal_damping_split,
     required_gap,
     supplemental_damping,
 )
@@ -66,18 +65,6 @@ def test_a_demand_that_rises_again_is_not_robust():
     assert not found.robust
     assert _least(demand, 0.5, 0.4) == (0.0, pytest.approx(0.08), True)
     assert _least(demand, 0.13, 0.4) == (0.0, pytest.approx(0.08), False)
-
-
-def test_the_best_split_needs_no_more_than_half_and_half():
-    # mutation: shares exchanged between the structures, the largest sum in place of the least
-    gap = 0.85 * needed_gap(0.05, 0.05)
-    half = supplemental_damping(GROUND, DT, 0.9, 0.05, 1.2, 0.05, gap, 0.5, 0.5)
-    best = optimal_damping_split(GROUND, DT, 0.9, 0.05, 1.2, 0.05, gap)
-    assert best.added.damping <= half.damping
-    again = supplemental_damping(
-        GROUND, DT, 0.9, 0.05, 1.2, 0.05, gap, best.share_1, 1 - best.share_1
-    )
-    assert again == best.added
 
 
 def test_required_gap_is_the_last_that_fails():

@@ -1,1 +1,0 @@
-"""Rows of structures that end at walls: seismically isolated buildings and bridges."""
