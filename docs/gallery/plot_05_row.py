@@ -42,9 +42,9 @@ plt.show()
 wall = per_obspy.Structure(1.0, 0.0, mass=np.inf, participation=0.0)
 isolated = per_obspy.Structure(3.0, 0.1, 1e6)
 moat = per_obspy.pounding_history(
-    motion, scenario.dt, [wall, isolated, wall], gaps=[0.03, 0.04], restitution=0.4
+    motion, scenario.dt, [wall, isolated, wall], gaps=[0.015, 0.02], restitution=0.4
 )
 impacts = moat.impacts["counted"].sum()
 low, high = moat.displacement[1].min(), moat.displacement[1].max()
-print(f"{impacts} impacts on walls 3 cm to the left and 4 cm to the right")
+print(f"{impacts} impacts on walls 15 mm to the left and 20 mm to the right")
 print(f"it moves from {low:.3f} to {high:.3f} m")
