@@ -26,7 +26,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.config import Run
 from per_obspy.pipeline import stages
-from per_obspy.pipeline.results.faults import Report
+from per_obspy.pipeline.results.report_files import Report
 from per_obspy.pipeline.run import run
 from per_obspy.records.folder import find_stations
 

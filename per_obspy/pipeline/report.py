@@ -1,95 +1,49 @@
-"""Last stage: the risk table and the spectra become totals, figures and layers for a map."""
+"""Last stage of a run: the risk table and the spectra become totals, figures, layers and a page."""
 
 import math
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Run
-from per_obspy.errors import CatalogError
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.results.faults import Report
-from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
-from per_obspy.pipeline.results.page import worst_pairs, write_run_page
-from per_obspy.pipeline.results.result_files import Screening, write_results
+from per_obspy.pipeline.results.drawings import page_drawings, station_rows
+from per_obspy.pipeline.results.report_files import (
+    Report,
+    TableReader,
+    content_note,
+    made_with,
+    needed_columns,
+    outlines_beside,
+    read_table,
+    with_areas,
+    with_page_data,
+    write_files,
+)
 from per_obspy.pipeline.results.run_facts import event_of_run, read_stations, revision_of_run
-from per_obspy.pipeline.results.table_notes import Notes, needed_columns
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
-from per_obspy.report.overview import Region, draw_overview
+from per_obspy.report.page.document import write_page
+from per_obspy.report.page.export_columns import MOST_COLUMNS
 from per_obspy.report.page.first_screen import revision_line
-from per_obspy.report.page.tally import COUNTED, PairTally
+from per_obspy.report.page.tally import PAGE_PAIRS
+from per_obspy.report.page.texts import LANGUAGES
 from per_obspy.report.pair_figure import draw_record_to_pair
-from per_obspy.report.summary.statements import event_sentences
-from per_obspy.report.words import number
-from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
-from per_obspy.spectra.storage import region, write_spectra
+from per_obspy.report.results import Event, Region, Results
+from per_obspy.report.summary.statements import event_sentences, station_sentences
+from per_obspy.report.summary.wording import WORDING
+from per_obspy.spectra.storage import region as joined_spectra
+from per_obspy.spectra.storage import write_spectra
 from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.ranked.ranked_table import RankedTable, ranked_table
-from per_obspy.tables.totals import (
-    CountedTotals,
-    RegionTotals,
-    piece_totals,
-    region_totals,
-    totals_columns,
-    with_buildings,
-    write_totals,
-)
-
-#: Pairs that a figure shows, evenly from all of them: marks of more would cover each other.
-SHOWN = 20_000
-
-#: Columns of the pairs that a figure shows.
-SHOWN_COLUMNS = ["rank", "pair_id", "risk_class", "longitude", "latitude", "demand", "gap"]
-
-#: Columns of the pairs whose pounding was observed.
-OBSERVED_COLUMNS = ["observed", "state", "probability"]
-
-
-class RiskSummary(NamedTuple):
-    """
-    Data of the report from the risk table, read in one pass.
-
-    Attributes
-    ----------
-    worst : Series or None
-        The worst pair that has a record; None if no pair has one.
-    shown : DataFrame
-        Pairs that a figure shows: all of a small table, every tenth or so of a large one.
-    observed : DataFrame
-        Pairs whose pounding was observed.
-    totals : RegionTotals
-        By area.
-    notes : Notes
-        Numbers of the whole table, and its worst rows.
-    page : (PairTally, DataFrame)
-        Counts and worst pairs of the page.
-    """
-
-    worst: pd.Series | None
-    shown: pd.DataFrame
-    observed: pd.DataFrame
-    totals: RegionTotals
-    notes: Notes
-    page: tuple[PairTally, pd.DataFrame]
-
-
-class _Pieces(NamedTuple):
-    """Summaries of the pieces of a risk table, in their order."""
-
-    rows: list[int]
-    first_named: list[int]
-    shown: list[pd.DataFrame]
-    observed: list[pd.DataFrame]
-    totals: CountedTotals
-    notes: Notes
 
 
 def reported(
@@ -118,30 +72,26 @@ def reported(
         Called when it begins and ends.
     """
     progress("report", 0, 1)
-    simulated = simulated_motion(settings, stations)
-    report, risk = Report([], []), table_files(folder)
-    spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
-    if spectra is not None:
+    report, spectra = Report([], []), None
+    usable = [station.spectra for station in stations if station.spectra is not None]
+    if stations:
+        spectra = joined_spectra(iter(usable))
+        write_spectra(spectra, folder / "spectra.nc")
         report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
-    if risk:
-        place = _region(settings, simulated, spectra, folder)
-        summary = _summary(settings, risk, folder, place, report)
-        # Totals, layers and the comparison with observations need no record
-        write_totals(summary.totals.table, folder / "totals.csv")
-        report.outputs.append(folder / "totals.csv")
-        report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
-        _write_summary(settings, summary, folder, place, coverage, report)
-        _draw_figures(summary, place, stations, folder, report)
-        with report.tried(folder / "report.html"):
-            found = (*summary.page, summary.totals.table, coverage)
-            write_run_page(settings, folder, stations, found, simulated)
+    if table_files(folder):
+        shakemap = settings.records.shakemap if settings.records else None
+        region = run_region(settings, simulated_motion(settings, stations), spectra)
+        known = event_of_run(folder / "run.json", region, shakemap)
+        if region.epicentre is None:
+            region = region._replace(epicentre=_epicentre(known))
+        _report_pairs(settings, folder, stations, coverage, region, known, report)
     progress("report", 1, 1)
     return report
 
 
-def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None, folder: Path) -> Region:
-    """Return title, classes, stations and epicentre of a run."""
+def run_region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Region:
+    """Return title, classes, stations and epicentre of a run, as far as its spectra know them."""
     places = pd.DataFrame({"longitude": [], "latitude": []}, dtype="float64")
     epicentre = None
     if spectra is not None:
@@ -151,154 +101,168 @@ def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None, folder: 
         if set(attributes) <= set(spectra.attrs):
             epicentre = (float(spectra.attrs[attributes[0]]), float(spectra.attrs[attributes[1]]))
     # Classes in their order, the worst first
-    classes = list(settings.screening.classes)
-    region = Region(settings.name, classes, simulated, places, epicentre)
-    if epicentre is None:
-        region = region._replace(epicentre=_epicentre_of(_event(settings, folder, region)))
-    return region
+    return Region(settings.name, list(settings.screening.classes), simulated, places, epicentre)
 
 
-def _event(settings: Run, folder: Path, place: Region) -> dict[str, Any]:
-    """Return the facts of the earthquake, of records or of the ShakeMap."""
-    shakemap = settings.records.shakemap if settings.records else None
-    return event_of_run(folder / "run.json", place, shakemap)
-
-
-def _epicentre_of(event: Mapping[str, Any]) -> tuple[float, float] | None:
+def _epicentre(known: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return longitude and latitude of an epicentre, None if unknown."""
-    longitude, latitude = (number(event, name) for name in ("longitude", "latitude"))
-    known = math.isfinite(longitude) and math.isfinite(latitude)
-    return (longitude, latitude) if known else None
+    longitude, latitude, _ = _coordinates(known, "")
+    is_known = math.isfinite(longitude) and math.isfinite(latitude)
+    return (longitude, latitude) if is_known else None
 
 
-def _write_summary(
+def _report_pairs(
     settings: Run,
-    summary: RiskSummary,
     folder: Path,
-    place: Region,
+    stations: Sequence[FinishedStation],
     coverage: Coverage,
+    region: Region,
+    known: Mapping[str, Any],
     report: Report,
 ) -> None:
-    """Write summary, KML and workbook."""
-    language = settings.report.language
-    revision = revision_of_run(folder / "run.json")
-    number = settings.report.revision or revision.number
-    # Which result this is comes first, then the earthquake
-    line = revision_line(number, revision.time, revision.event_id, language)
-    source = [f"{line}."] if line else []
-    source += event_sentences(_event(settings, folder, place), language)
-    stations = read_stations(folder / "stations.csv")
-    written = Screening(folder, "risk", place, source, coverage, settings.spreadsheet, language)
-    written = written._replace(stations=stations, areas=summary.totals.table)
-    write_results(written, summary.notes, summary.shown, report)
+    """Write everything that shows pairs; ``known`` are the facts of the earthquake."""
+    outlines = outlines_beside(
+        settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
+    )
+    results = _described(settings, folder, stations, coverage, region, known)
+    results, reader, worst = _with_pairs(settings, folder, results, outlines, report)
+    # Totals, layers and the comparison with observations need no record
+    report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
+    write_files(results, folder, settings.spreadsheet, report)
+    _draw_worst_pair(worst, stations, folder, report)
+    with report.tried(folder / "report.html"):
+        page = with_page_data(results, folder, outlines)
+        drawings = page_drawings(settings, results.worst, stations)
+        table = station_rows(folder / "stations.csv", stations)
+        write_page(replace(page, stations=table, drawings=drawings), folder / "report.html")
 
 
-def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Dataset:
-    """Write the spectra of all stations, and return them."""
-    spectra = region(station.spectra for station in stations if station.spectra is not None)
-    write_spectra(spectra, path)
-    return spectra
-
-
-def _summary(
-    settings: Run, risk: Sequence[Path], folder: Path, place: Region, report: Report
-) -> RiskSummary:
-    """Read the risk table once, and write its layers; return totals, worst pairs and notes."""
+def _with_pairs(
+    settings: Run, folder: Path, results: Results, outlines: Path | None, report: Report
+) -> tuple[Results, TableReader, "pd.Series[Any] | None"]:
+    """Return the results with their pairs, what was read of all, and the worst with a record."""
     is_whole = settings.geopackage or settings.spreadsheet
-    columns = None if is_whole else _needed_columns(settings)
-    # The layer takes the pieces one by one, and so they are noted on the way
-    pieces = _Pieces([], [], [], [], CountedTotals(), Notes(list(settings.screening.classes)))
-    with ranked_table(risk, columns) as table:
-        listed = worst_pairs(table, settings)
-        noted = _noted(table, settings, pieces)
-        if settings.geopackage:
-            files = layer_paths(folder, "risk")
-            with report.tried(*files):
-                _write_layers(settings, noted, pieces, place, files)
-        # All rows, or those that a layer left when it failed; a table that fails is a fault
-        deque(noted, maxlen=0)
-        if sum(pieces.rows) != table.pairs:
-            raise CatalogError(str(risk[0]), "cannot be read to its end: run again")
-        worst = table.row(min(pieces.first_named)) if pieces.first_named else None
-    return RiskSummary(
-        worst,
-        pd.concat(pieces.shown).sort_values("rank", ignore_index=True),
-        pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        _totals(settings, pieces, folder),
-        pieces.notes,
-        (pieces.notes.tally, listed),
-    )
+    columns = None if is_whole else needed_columns(settings.totals)
+    with ranked_table(table_files(folder), columns) as table:
+        # The pieces may lack columns, the pairs of the page have all of them
+        results = replace(results, worst=worst_pairs(table, settings))
+        reader = TableReader(results.region.classes, settings.totals, table.pairs, is_whole=False)
+        results = read_table(
+            results, reader, table.pieces(), folder, outlines, settings.geopackage, report
+        )
+        return results, reader, table.row(reader.recorded) if reader.recorded else None
 
 
-def _needed_columns(settings: Run) -> list[str]:
-    """Return the columns of the risk table that the report needs for every pair."""
-    figures = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, *totals_columns(settings.totals)]
-    return needed_columns([*figures, *COUNTED])
-
-
-def _totals(settings: Run, pieces: _Pieces, folder: Path) -> RegionTotals:
-    """Return the totals of all pieces, with the buildings of each area where they are known."""
-    totals = region_totals(pieces.totals, settings.totals)
-    return totals._replace(table=with_buildings(totals.table, folder / "buildings.parquet"))
-
-
-def _write_layers(
+def _described(
     settings: Run,
-    noted: Iterator[pd.DataFrame],
-    pieces: _Pieces,
-    place: Region,
-    files: tuple[Path, Path, Path],
-) -> None:
-    """Write all layers; totals are available after the last piece."""
-    write_map_layers(
-        noted,
-        place,
-        read_stations(files[0].with_name("stations.csv")),
-        lambda: _totals(settings, pieces, files[0].parent),
-        outlines_beside(
-            settings.pairs.file if settings.pairs else None, files[0].with_name("pairs.csv")
-        ),
-        files,
-    )
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    coverage: Coverage,
+    region: Region,
+    known: Mapping[str, Any],
+) -> Results:
+    """Return the results of a run but for its table of pairs."""
+    table, language = read_stations(folder / "stations.csv"), settings.report.language
+    event = _event(settings, folder, stations, table, known)
+    # Which result this is comes first, then the earthquake
+    line = revision_line(event.revision, event.revised, event.event_id, language)
+    source = [*([f"{line}."] if line else []), *event_sentences(known, language)]
+    return Results(
+        "risk", region, coverage, language, event, source,
+        stations=table, provenance=_provenance(settings),
+    )  # fmt: skip
 
 
-def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.DataFrame]:
-    """Yield the pieces of a risk table, and add each to the summaries of the report."""
-    step = -(-table.pairs // SHOWN)
-    classes = [*settings.screening.classes, UNKNOWN_CLASS]
-    for piece in table.pieces():
-        found.rows.append(len(piece))
-        rank = piece["rank"].to_numpy()
-        # Rows with a record
-        named = rank[(piece["station"] != "").to_numpy()]
-        found.first_named.extend(named[:1].tolist())
-        found.shown.append(piece.loc[rank % step == 1 % step, SHOWN_COLUMNS])
-        if "observed" in piece:
-            observed = piece["observed"].notna()
-            found.observed.append(piece.loc[observed, OBSERVED_COLUMNS])
-        found.totals.append(piece_totals(piece, settings.totals, classes))
-        found.notes.add(piece)
-        yield piece
+def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
+    """Return the worst pairs of a risk table with all columns and their areas."""
+    # The leading columns are those of the package, those of the inventory follow
+    area = [settings.totals.area] if settings.totals.area else []
+    names = table.schema.names[: 2 * MOST_COLUMNS]
+    worst = table.first(PAGE_PAIRS, [*names, *area])
+    return with_areas(worst, worst, settings.totals)
 
 
-def _draw_figures(
-    summary: RiskSummary,
-    place: Region,
+def _draw_worst_pair(
+    worst: "pd.Series[Any] | None",
     stations: Sequence[FinishedStation],
     folder: Path,
     report: Report,
 ) -> None:
-    """Draw the region, and the worst pair that has a record."""
-    walk, overview = (folder / "figures" / name for name in ("worst_pair.png", "overview.png"))
-    with report.tried(overview):
-        draw_overview(summary.shown, place, overview)
-    worst = summary.worst
+    """Draw the worst pair that has a record, from record to pounding; nothing without one."""
     if worst is None:
         return
     # Only here a station's motion is needed again
-    name = worst["station"].strip(".")
+    name, walk = worst["station"].strip("."), folder / "figures" / "worst_pair.png"
     (station,) = (station for station in stations if station.shard and station.shard.stem == name)
     assert station.shard is not None  # chosen so
     motion = read_station_once(station.shard, station.hash)
     with report.tried(walk):
         draw_record_to_pair(motion, worst, walk)
+
+
+def _event(
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    table: pd.DataFrame,
+    known: Mapping[str, Any],
+) -> Event:
+    """Return the earthquake, as far as its file and the spectra of the stations know it."""
+    facts = [station.spectra.attrs for station in stations if station.spectra is not None]
+    # Undated records begin in 1970
+    starts = [str(one.get("time_coverage_start", "1970")) for one in facts]
+    start = min((time for time in starts if time >= "1971"), default="")
+    revision, language = revision_of_run(folder / "run.json"), settings.report.language
+    # A ShakeMap is named in sentences of its own
+    source = [*event_sentences(known, language), *station_sentences(table, language)]
+    return Event(
+        start=start[:19].replace("T", " "),
+        time=str(known.get("time") or "")[:19].replace("T", " "),
+        magnitude=_number(known.get("magnitude")),
+        place=_place(facts, known),
+        source=" ".join(source) if known.get("map") else "",
+        revision=settings.report.revision or revision.number,
+        revised=revision.time,
+        event_id=revision.event_id,
+    )
+
+
+def _place(
+    facts: Sequence[Mapping[str, Any]], known: Mapping[str, Any]
+) -> tuple[float, float, float] | None:
+    """Return longitude, latitude and depth of the hypocentre, None if it is unknown."""
+    places = [_coordinates(one, "hypocentre_") for one in facts]
+    for place in (*places, _coordinates(known, "")):
+        # The depth may be unknown
+        if np.isfinite(place[:2]).all():
+            return place
+    return None
+
+
+def _coordinates(facts: Mapping[str, Any], prefix: str) -> tuple[float, float, float]:
+    """Return longitude, latitude and depth of keys with a prefix, NaN where missing."""
+    longitude, latitude, depth = (
+        _number(facts.get(f"{prefix}{axis}")) for axis in ("longitude", "latitude", "depth")
+    )
+    return longitude, latitude, depth
+
+
+def _number(value: Any) -> float:
+    """Return a number of a status file, NaN where there is none."""
+    is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return float(value) if is_number else math.nan
+
+
+def _provenance(settings: Run) -> list[tuple[str, str]]:
+    """Return the provenance of the results as pairs of title and text."""
+    # Everything else is in the files next to the page
+    language = settings.report.language
+    texts = LANGUAGES[language]
+    has_map = settings.records is not None and settings.records.shakemap is not None
+    exact = {"exact": settings.screening.exact, "output": settings.output.name}
+    return [
+        made_with(language),
+        (texts["files"], texts["files_list"]),
+        (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
+        *content_note([WORDING[language]["page_shakemap"]] if has_map else [], language),
+    ]

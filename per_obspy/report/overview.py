@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.report.clusters import Frame, IntArray, clusters, continuous, frame_of
+from per_obspy.report.results import Region
 from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
@@ -42,31 +43,6 @@ SMALL = 0.15
 
 #: Space around the points of a map, share of its longer side.
 MARGIN = 0.06
-
-
-class Region(NamedTuple):
-    """
-    Facts of a screening for its overview and summary.
-
-    Attributes
-    ----------
-    title : str
-        Name of the run.
-    classes : sequence of str
-        Names of the risk classes, worst first.
-    simulated : bool
-        Whether the ground motion is simulated.
-    stations : DataFrame
-        ``longitude, latitude`` of stations with usable records, degrees; may be empty.
-    epicentre : tuple of float, or None
-        Longitude and latitude, degrees.
-    """
-
-    title: str
-    classes: Sequence[str]
-    simulated: bool
-    stations: pd.DataFrame
-    epicentre: tuple[float, float] | None = None
 
 
 class _Points(NamedTuple):

@@ -31,7 +31,7 @@ from per_obspy.config import Notify  # noqa: E402 - after the path
 from per_obspy.files import is_part  # noqa: E402 - after the path
 from per_obspy.operation.watch import watch_once  # noqa: E402 - after the path
 from per_obspy.pipeline import report  # noqa: E402 - after the path
-from per_obspy.pipeline.results import result_files  # noqa: E402 - after the path
+from per_obspy.pipeline.results import report_files  # noqa: E402 - after the path
 from per_obspy.records.simulation.earthquake import Simulation  # noqa: E402 - after the path
 
 #: Tables that must be the same to the byte.
@@ -40,9 +40,9 @@ TABLES = (*TABLES, "totals.csv", "event.xml")
 
 #: Functions that write a figure, which is most of the time of a small run and not compared.
 FIGURES = (
-    (report, "draw_overview"),
+    (report_files, "draw_overview"),
     (report, "draw_record_to_pair"),
-    (result_files, "write_page"),
+    (report_files, "write_summary_page"),
 )
 
 #: Newest revision in the folder of a city.

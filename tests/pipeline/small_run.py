@@ -14,7 +14,7 @@ import pytest
 
 from per_obspy.files import written_whole
 from per_obspy.pipeline import report
-from per_obspy.pipeline.results import result_files
+from per_obspy.pipeline.results import report_files
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -60,17 +60,12 @@ def plain_figure(*arguments: object) -> None:
         part.write_bytes(b"a figure")
 
 
-def plain_page(_settings: object, folder: Path, *_others: object) -> None:
-    """Write the page of a run as a short file."""
-    plain_figure(folder / "report.html")
-
-
 #: Functions that draw, and those that write short files instead; the page is the last.
 PLAIN = (
-    (report, "draw_overview", plain_figure),
+    (report_files, "draw_overview", plain_figure),
     (report, "draw_record_to_pair", plain_figure),
-    (result_files, "write_page", plain_figure),
-    (report, "write_run_page", plain_page),
+    (report_files, "write_summary_page", plain_figure),
+    (report, "write_page", plain_figure),
 )
 REAL = tuple((module, name, getattr(module, name)) for module, name, _ in PLAIN)
 

@@ -13,9 +13,12 @@ from pyarrow import parquet
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
-from per_obspy.pipeline import report as report_stage
-from per_obspy.pipeline.report import Report, _region, _summary
+from per_obspy.pipeline.report import _with_pairs, run_region
+from per_obspy.pipeline.results import report_files
+from per_obspy.pipeline.results.report_files import Report
 from per_obspy.pipeline.run import report, run
+from per_obspy.report.results import Results
+from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked import ranked_table
 
 from .small_run import InProcess, real_reports, write_configuration
@@ -62,35 +65,35 @@ def test_a_report_needs_a_finished_run(copied):
         report(copied / "run.toml")
 
 
-def summary(folder):
-    settings, table = load(folder / "run.toml", Run), [folder / "out" / "risk.parquet"]
-    return _summary(
-        settings, table, folder, _region(settings, True, None, folder / "out"), Report([], [])
-    )
+def read(folder):
+    """Return the results, what was read of all rows, and the worst pair with a record."""
+    settings, out = load(folder / "run.toml", Run), folder / "out"
+    results = Results("risk", run_region(settings, True, None), Coverage(60, 60))
+    return _with_pairs(settings, out, results, None, Report([], []))
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
     # would catch rows lost between pieces, and a worst pair of a later piece
     monkeypatch.setattr(ranked_table, "ROWS", size)
-    found = summary(copied)
+    results, reader, worst = read(copied)
     table = pd.read_parquet(copied / "out" / "risk.parquet")
     named = table[table["station"] != ""].iloc[0]
-    assert found.worst["pair_id"] == named["pair_id"]
-    assert found.worst.index.tolist() == table.columns.tolist()
+    assert worst["pair_id"] == named["pair_id"]
+    assert worst.index.tolist() == table.columns.tolist()
     # every pair of a small table is shown, and every observed one counts
-    pd.testing.assert_frame_equal(found.shown, table[report_stage.SHOWN_COLUMNS])
-    observed = table.loc[table["observed"].notna(), report_stage.OBSERVED_COLUMNS]
-    pd.testing.assert_frame_equal(found.observed, observed.reset_index(drop=True))
-    assert found.totals.table["pairs"].sum() == len(table)
+    pd.testing.assert_frame_equal(results.shown, table[report_files.SHOWN_COLUMNS])
+    observed = table.loc[table["observed"].notna(), report_files.OBSERVED_COLUMNS]
+    pd.testing.assert_frame_equal(reader.observed, observed.reset_index(drop=True))
+    assert results.areas["pairs"].sum() == len(table)
 
 
 def test_a_large_table_is_shown_in_equal_steps(copied, monkeypatch):
-    monkeypatch.setattr(report_stage, "SHOWN", 20)
+    monkeypatch.setattr(report_files, "SHOWN", 20)
     monkeypatch.setattr(ranked_table, "ROWS", 7)
     count = parquet.read_metadata(copied / "out" / "risk.parquet").num_rows
     step = -(-count // 20)
-    assert summary(copied).shown["rank"].tolist() == list(range(1, count + 1, step))
+    assert read(copied)[0].shown["rank"].tolist() == list(range(1, count + 1, step))
 
 
 KINDS = [("", "MultiPolygon"), ("[totals]\nh3 = 6\n", "MultiPolygon")]
@@ -194,7 +197,7 @@ def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, faili
         raise ValueError("$x_$\nExpected\nend of text")
 
     with monkeypatch.context() as patch:
-        patch.setattr(report_stage, failing, fails)
+        patch.setattr(report_files, failing, fails)
         code, _, errors = call("report", copied / "run.toml")
     (line,) = [line for line in errors.splitlines() if line.startswith("per-obspy: ")]
     assert code == 0

@@ -9,7 +9,7 @@ import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.records.shakemap import map_event
-from per_obspy.report.overview import Region
+from per_obspy.report.results import Region
 from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.station_summary import COLUMNS
 

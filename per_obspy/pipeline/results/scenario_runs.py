@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
 from per_obspy.inventory.suspicions import ROW_SUSPICIONS
-from per_obspy.pipeline.results.layer_sources import outlines_beside
-from per_obspy.pipeline.results.station_facts import HISTORIES, pair_histories, station_rows
+from per_obspy.pipeline.results.drawings import HISTORIES, pair_histories, station_rows
+from per_obspy.pipeline.results.report_files import outlines_beside
 from per_obspy.pipeline.stations import stations_of_earlier_run
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.report.coverage import coverage_number, coverage_sentences
 from per_obspy.report.page.export_columns import addresses, pack_export, text_kind
-from per_obspy.report.page.first_screen import Event, PageBuildings, first_screen
+from per_obspy.report.page.first_screen import first_screen
 from per_obspy.report.page.packing import (
     FRACTION_BITS,
     LONGEST_TEXT,
@@ -19,11 +19,11 @@ from per_obspy.report.page.packing import (
 )
 from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases, written
+from per_obspy.report.results import Results
 from per_obspy.report.style import BUILDING_COLOURS, class_colours
 from per_obspy.report.words import missing_gap, prevention_kind
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.tables.coverage import Coverage
 
 #: Columns of a pair on the page, and their kinds.
 PAIR_KINDS = {
@@ -75,170 +75,76 @@ MOST_ROWS = 500
 LONGEST_CELL = 300
 
 
-class PageDrawings(NamedTuple):
-    """
-    Drawings and sensitivities of some pairs and stations.
-
-    Attributes
-    ----------
-    stations : mapping of str to dict
-        Name -> record and spectra of a station for a drawing.
-    sensitivity : mapping of int to list
-        Rank -> input, both values, and probability and state at each of them.
-    worst, doubtful : int
-        Pairs whose sensitivity is computed: the worst, and those with a chance nearest to a half.
-    """
-
-    stations: Mapping[str, dict[str, Any]]
-    sensitivity: Mapping[int, list[list[Any]]]
-    worst: int
-    doubtful: int
-
-
-#: A page without drawings of stations and without sensitivities.
-NO_DRAWINGS = PageDrawings({}, {}, 0, 0)
-
-
-class PageData(NamedTuple):
-    """
-    Data of a page.
-
-    Attributes
-    ----------
-    title : str
-        Name of the run.
-    language : Language
-        Of its texts.
-    simulated : bool
-        Whether the motion is simulated.
-    classes : sequence of str
-        Names of the risk classes, worst first.
-    event : Event
-        The earthquake.
-    tally : PairTally
-        Of all pairs.
-    worst : DataFrame
-        The worst pairs in their order, at most ``PAGE_PAIRS``.
-    stations, areas, rejected : DataFrame
-        Tables of the run; ``rejected`` is its beginning.
-    rejections : int
-        Rows of the whole table of rejections.
-    buildings : PageBuildings or None
-        The worst buildings, and how many a neighbour can hit.
-    outlines : list of (str, list of float)
-        Buildings and their outlines: longitude and latitude by turns, degrees.
-    lines : mapping of str to list
-        ``coast`` and ``borders``, lines of longitude and latitude by turns.
-    histories : mapping of int to dict
-        Rank -> history of a pair for a drawing.
-    provenance : sequence of (str, str)
-        Where the results come from.
-    coverage : Coverage
-        Rows of the pair tables, and those that are left out.
-    drawings : PageDrawings
-        Stations and sensitivities for drawings.
-    kind : str
-        ``run``, ``design`` or ``ensemble``, which differ in some texts.
-    """
-
-    title: str
-    language: Language
-    simulated: bool
-    classes: Sequence[str]
-    event: Event
-    tally: PairTally
-    worst: pd.DataFrame
-    stations: pd.DataFrame
-    areas: pd.DataFrame
-    rejected: pd.DataFrame
-    rejections: int
-    buildings: PageBuildings | None
-    outlines: Sequence[tuple[str, list[float]]]
-    lines: Mapping[str, list[list[float]]]
-    histories: Mapping[int, dict[str, Any]]
-    provenance: Sequence[tuple[str, str]]
-    coverage: Coverage
-    drawings: PageDrawings = NO_DRAWINGS
-    kind: str = "run"
-
-
-def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
+def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, with descriptions of its tables, and the tables."""
     # Sentences first, then whatever the script draws
-    facts = data.language, data.simulated
-    # Tables of which it names rows
-    found = data.areas, data.stations
-    screen = first_screen(data.event, data.tally, data.worst, found, data.buildings, facts)
+    screen = first_screen(results)
     # What has a verdict, of all that should have one, is the first number
-    screen.numbers.insert(0, _pairs_screened(data))
-    texts, tables = LANGUAGES[data.language], _tables(data)
+    whole = partial(written, digits=0, language=results.language)
+    screen.numbers.insert(0, coverage_number(results.coverage, results.language, whole))
+    texts, tables = LANGUAGES[results.language], _tables(results)
     content = {
-        "language": data.language,
-        "texts": _texts(texts, data.kind),
+        "language": results.language,
+        "texts": _texts(texts, results.stem),
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
         "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
-        "title": shortened(data.title, LONGEST_CELL),
-        "simulated": data.simulated,
-        "coverage": coverage_sentences(data.coverage, data.language),
-        "warns": data.coverage.lacks_many,
+        "title": shortened(results.region.title, LONGEST_CELL),
+        "simulated": results.region.simulated,
+        "coverage": coverage_sentences(results.coverage, results.language),
+        "warns": results.coverage.lacks_many,
         **screen._asdict(),
-        "states": _states(data.tally, texts),
-        "classes": _classes(data, texts),
-        "pair_count": data.tally.pairs,
-        **_drawn(data),
-        **_further_tables(data, texts),
+        "states": _states(results.tally, texts),
+        "classes": _classes(results, texts),
+        "pair_count": results.tally.pairs,
+        **_drawn(results),
+        **_further_tables(results, texts),
         "tables": [table.description for table in tables],
     }
     return content, tables
 
 
-def _pairs_screened(data: PageData) -> tuple[str, str]:
-    """Return the number of pairs with a verdict, and its meaning."""
-    whole = partial(written, digits=0, language=data.language)
-    return coverage_number(data.coverage, data.language, whole)
-
-
-def _texts(texts: Mapping[str, str], kind: str) -> dict[str, str]:
-    """Return the texts of the script; those of this kind of page replace the general ones."""
+def _texts(texts: Mapping[str, str], stem: str) -> dict[str, str]:
+    """Return the texts of the script; those of this kind of results replace the general ones."""
     shown = {key: text for key, text in texts.items() if not key.startswith(HIDDEN)}
-    ending = f"_{kind}"
+    ending = f"_{stem}"
     own = {key.removesuffix(ending): shown[key] for key in shown if key.endswith(ending)}
     return shown | own
 
 
-def _drawn(data: PageData) -> dict[str, Any]:
+def _drawn(results: Results) -> dict[str, Any]:
     """Return the data of map and figures that are not in tables."""
+    drawings = results.drawings
     return {
         "building_colours": BUILDING_COLOURS,
-        "cell_size": data.tally.cells.size,
-        "epicentre": list(data.event.place[:2]) if data.event.place else None,
-        **data.lines,
+        "cell_size": results.tally.cells.size,
+        "epicentre": list(results.event.place[:2]) if results.event.place else None,
+        **results.lines,
         # Names as they are packed, by which the script finds the pairs of an outline
-        "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in data.outlines],
-        "histories": {str(rank): history for rank, history in data.histories.items()},
-        "history_count": len(data.histories),
+        "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in results.outlines],
+        "histories": {str(rank): history for rank, history in drawings.histories.items()},
+        "history_count": len(drawings.histories),
         "station_drawings": {
-            shortened(name, LONGEST_TEXT): drawn for name, drawn in data.drawings.stations.items()
+            shortened(name, LONGEST_TEXT): station for name, station in drawings.stations.items()
         },
-        "sensitivity": {str(rank): rows for rank, rows in data.drawings.sensitivity.items()},
-        "sensitivity_counts": [data.drawings.worst, data.drawings.doubtful],
+        "sensitivity": {str(rank): rows for rank, rows in drawings.sensitivity.items()},
+        "sensitivity_counts": [drawings.worst, drawings.doubtful],
     }
 
 
-def _tables(data: PageData) -> list[PackedTable]:
+def _tables(results: Results) -> list[PackedTable]:
     """Return pairs, cells, buildings, and the columns of pairs that only the export needs."""
-    cells = data.tally.cells.table()
+    cells = results.tally.cells.table()
     kinds = dict.fromkeys(("longitude", "latitude"), "place")
     kinds |= {str(name): "whole" for name in cells if name not in kinds}
     # Places of the inventory by name, for the search
-    address, pairs = addresses(data.worst), _with_measures(data.worst)
+    address, pairs = addresses(results.worst), _with_measures(results.worst)
     if address is not None:
         pairs = pairs.assign(address=address)
     return [
         pack_table(pairs, PAIR_KINDS | {"address": text_kind(pairs, "address")}),
         pack_table(cells, kinds),
-        pack_table(_buildings(data), BUILDING_KINDS),
-        pack_export(data.worst, PAIR_KINDS),
+        pack_table(_buildings(results), BUILDING_KINDS),
+        pack_export(results.worst, PAIR_KINDS),
     ]
 
 
@@ -258,14 +164,12 @@ def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
     return pairs.assign(probability=kept)
 
 
-def _buildings(data: PageData) -> pd.DataFrame:
+def _buildings(results: Results) -> pd.DataFrame:
     """Return the buildings with their prevention in the language of the page."""
-    if data.buildings is None:
-        return pd.DataFrame()
-    worst = data.buildings.worst
+    worst = results.buildings
     if "prevention" not in worst:
         return worst
-    sentences = [fixed_phrases(str(text), data.language) for text in worst["prevention"]]
+    sentences = [fixed_phrases(str(text), results.language) for text in worst["prevention"]]
     return worst.assign(prevention=sentences)
 
 
@@ -277,50 +181,53 @@ def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:
     ]
 
 
-def _classes(data: PageData, texts: Mapping[str, str]) -> list[dict[str, Any]]:
+def _classes(results: Results, texts: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return the classes, the worst first, with colour, weight of the mark and number of pairs."""
-    colours = class_colours(data.classes)
+    # The worst is the first
+    colours = class_colours(results.region.classes)
     return [
         {
             "name": name,
             "label": texts.get(f"class_{name}", shortened(name, 40)),
             "colour": colour,
             "weight": 4.0 * max(1.0 - number / max(len(colours) - 2, 1), 0.0),
-            "count": data.tally.classes[name],
+            "count": results.tally.classes[name],
         }
         for number, (name, colour) in enumerate(colours.items())
     ]
 
 
-def _further_tables(data: PageData, texts: Mapping[str, str]) -> dict[str, Any]:
+def _further_tables(results: Results, texts: Mapping[str, str]) -> dict[str, Any]:
     """Return stations, areas, rejections and provenance."""
-    areas, note = data.areas, texts["rejected_none"]
+    areas, note = results.areas, texts["rejected_none"]
     if "expected_pounding" in areas:
         areas = areas.sort_values("expected_pounding", ascending=False)
-    if data.rejections:
-        shown = min(data.rejections, MOST_ROWS)
-        key = "rejected_some_one" if data.rejections == 1 else "rejected_some"
-        note = texts[key].format(shown=shown, all=data.rejections)
-    elif data.coverage.pairs > data.coverage.screened:
+    if results.rejections:
+        shown = min(results.rejections, MOST_ROWS)
+        key = "rejected_some_one" if results.rejections == 1 else "rejected_some"
+        note = texts[key].format(shown=shown, all=results.rejections)
+    elif results.coverage.pairs > results.coverage.screened:
         # What the search for pairs left out is in no table of this run
-        note = " ".join(coverage_sentences(data.coverage, data.language))
+        note = " ".join(coverage_sentences(results.coverage, results.language))
     # Stations are on the map too
-    stations = _rows(_described(data.stations, data.language), STATION_COLUMNS, texts)
+    stations = _rows(_described(results.stations, results.language), STATION_COLUMNS, texts)
     return {
-        "stations": {**stations, "places": _station_places(data.stations)},
+        "stations": {**stations, "places": _station_places(results.stations)},
         "areas": _rows(areas, AREA_COLUMNS, texts),
-        "rejected": {**_rows(_reasons(data, texts), REJECTED_COLUMNS, texts), "note": note},
-        "provenance": [[name, shortened(value, LONGEST_CELL)] for name, value in data.provenance],
+        "rejected": {**_rows(_reasons(results, texts), REJECTED_COLUMNS, texts), "note": note},
+        "provenance": [
+            [name, shortened(value, LONGEST_CELL)] for name, value in results.provenance
+        ],
     }
 
 
-def _reasons(data: PageData, texts: Mapping[str, str]) -> pd.DataFrame:
+def _reasons(results: Results, texts: Mapping[str, str]) -> pd.DataFrame:
     """Return the rejections with kinds and reasons in the language of the page."""
-    if not {"kind", "reasons"} <= set(data.rejected):
-        return data.rejected
-    kinds = [texts.get(f"kind_{kind}", str(kind)) for kind in data.rejected["kind"]]
-    reasons = [fixed_phrases(str(text), data.language) for text in data.rejected["reasons"]]
-    return data.rejected.assign(kind=kinds, reasons=reasons)
+    if not {"kind", "reasons"} <= set(results.rejected):
+        return results.rejected
+    kinds = [texts.get(f"kind_{kind}", str(kind)) for kind in results.rejected["kind"]]
+    reasons = [fixed_phrases(str(text), results.language) for text in results.rejected["reasons"]]
+    return results.rejected.assign(kind=kinds, reasons=reasons)
 
 
 def _described(stations: pd.DataFrame, language: Language) -> pd.DataFrame:

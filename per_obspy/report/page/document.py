@@ -7,30 +7,31 @@ from importlib.resources import files
 from pathlib import Path
 
 from per_obspy.files import written_whole
-from per_obspy.report.page.content import PageData, page_content
+from per_obspy.report.page.content import page_content
 from per_obspy.report.page.packing import encoded
+from per_obspy.report.results import Results
 
 #: Parts of the script, in their order.
 SCRIPTS = ("data.js", "map.js", "list.js", "details.js", "stations.js", "page.js")
 
 
-def write_page(data: PageData, path: Path) -> None:
+def write_page(results: Results, path: Path) -> None:
     """
     Write the page, whole or not at all.
 
     Parameters
     ----------
-    data : PageData
+    results : Results
         Everything that it shows.
     path : Path
         ``report.html``.
     """
-    document = page_document(data)
+    document = page_document(results)
     with written_whole(path) as part:
         part.write_text(document, encoding="utf-8", newline="\n")
 
 
-def page_document(data: PageData) -> str:
+def page_document(results: Results) -> str:
     """
     Return the page as HTML.
 
@@ -38,7 +39,7 @@ def page_document(data: PageData) -> str:
     them as texts. The policy allows only the page's own script and style, by their hashes: no
     request leaves the browser.
     """
-    content, tables = page_content(data)
+    content, tables = page_content(results)
     style, script = _asset("page.css"), "\n".join(_asset(name) for name in SCRIPTS)
     policy = (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
@@ -46,7 +47,7 @@ def page_document(data: PageData) -> str:
     )
     # Every part goes into its place once; none is searched for places
     parts = {
-        "language": data.language,
+        "language": results.language,
         "policy": policy,
         "style": style,
         "script": script,

@@ -9,6 +9,7 @@ import pandas as pd
 from per_obspy.errors import shortened
 from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language, counted, fixed_phrases, written
+from per_obspy.report.results import Event, Results
 
 #: Names in a sentence.
 NAMED = 5
@@ -31,60 +32,6 @@ DOUBTS = {
     "record_warning": "sure_record",
     "shakemap_demand": "sure_map",
 }
-
-
-class PageBuildings(NamedTuple):
-    """
-    Buildings of a run, for the page.
-
-    Attributes
-    ----------
-    worst : DataFrame
-        The worst buildings, as many as the page shows.
-    hit : int or None
-        Number of all buildings that a neighbour can hit; None if the table does not know.
-    """
-
-    worst: pd.DataFrame
-    hit: int | None
-
-
-class Event(NamedTuple):
-    """
-    Facts of the earthquake, as far as the records know them.
-
-    Attributes
-    ----------
-    start : str
-        First sample of the first record, UTC; empty if unknown.
-    time : str
-        Origin time, UTC, of the event file; empty if unknown.
-    magnitude : float
-        Of the event file; NaN if unknown.
-    place : tuple of float or None
-        Longitude and latitude of the hypocentre, degrees, and its depth, m.
-    used, missing : int
-        Stations that serve pairs and those that do not.
-    source : str
-        Sentences on a spectrum or on scenarios in place of an earthquake; empty if there is one.
-    revision : int
-        Number of the revision of these results; 0 if they have none.
-    revised : str
-        Time of that revision, UTC, as text; empty if unknown.
-    event_id : str
-        Identifier of the earthquake in its list; empty if unknown.
-    """
-
-    start: str
-    time: str
-    magnitude: float
-    place: tuple[float, float, float] | None
-    used: int
-    missing: int
-    source: str = ""
-    revision: int = 0
-    revised: str = ""
-    event_id: str = ""
 
 
 class FirstScreen(NamedTuple):
@@ -111,40 +58,16 @@ class FirstScreen(NamedTuple):
     sure: list[str]
 
 
-def first_screen(
-    event: Event,
-    tally: PairTally,
-    worst: pd.DataFrame,
-    tables: tuple[pd.DataFrame, pd.DataFrame],
-    buildings: PageBuildings | None,
-    facts: tuple[Language, bool],
-) -> FirstScreen:
-    """
-    Write the first screen.
-
-    Parameters
-    ----------
-    event : Event
-        The earthquake.
-    tally : PairTally
-        Of all pairs.
-    worst : DataFrame
-        The worst pairs in their order.
-    tables : (DataFrame, DataFrame)
-        Totals by area, and stations with ``station, state, rejected``.
-    buildings : PageBuildings or None
-        Buildings, the worst first, if the run has them.
-    facts : (Language, bool)
-        Language, and whether the motion is simulated.
-    """
-    language, (areas, stations) = facts[0], tables
+def first_screen(results: Results) -> FirstScreen:
+    """Write the first screen of the page of some results."""
+    language, event = results.language, results.event
     return FirstScreen(
         _event_line(event, language),
         revision_line(event.revision, event.revised, event.event_id, language),
-        _expected(stations, language),
-        _numbers(tally, worst, buildings, language),
-        _first(tally, worst, areas, buildings, facts),
-        _sure(tally, areas, language) if tally.pairs else [],
+        _expected(results.stations, language),
+        _numbers(results),
+        _first(results),
+        _sure(results.tally, results.areas, language) if results.tally.pairs else [],
     )
 
 
@@ -235,16 +158,15 @@ def _place_texts(event: Event, language: Language) -> list[str]:
     return [epicentre, texts["event_depth"].format(value=written(depth / 1000.0, 0, language))]
 
 
-def _numbers(
-    tally: PairTally, worst: pd.DataFrame, buildings: PageBuildings | None, language: Language
-) -> list[tuple[str, str]]:
+def _numbers(results: Results) -> list[tuple[str, str]]:
     """Return numbers after that of the pairs: pounding, expected or buildings, class, velocity."""
     # Numbers that a decision needs, the last one in a unit
+    language, tally, worst = results.language, results.tally, results.worst
     texts = LANGUAGES[language]
     sure = tally.states["yes"] + tally.states["likely"]
     numbers = [(float(sure), "number_pounding")]
-    if buildings is not None and buildings.hit is not None:
-        numbers.append((float(buildings.hit), "number_buildings"))
+    if results.buildings_hit is not None:
+        numbers.append((float(results.buildings_hit), "number_buildings"))
     else:
         numbers.append((tally.expected, "number_expected"))
     counts = [
@@ -274,19 +196,13 @@ def _fastest(worst: pd.DataFrame, language: Language) -> list[tuple[str, str]]:
     return [(value, LANGUAGES[language]["number_velocity"])]
 
 
-def _first(
-    tally: PairTally,
-    worst: pd.DataFrame,
-    areas: pd.DataFrame,
-    buildings: PageBuildings | None,
-    facts: tuple[Language, bool],
-) -> list[str]:
+def _first(results: Results) -> list[str]:
     """Return sentences on first actions."""
-    language, simulated = facts
+    language, worst, tally = results.language, results.worst, results.tally
     texts = LANGUAGES[language]
-    said = [texts["todo_exercise"]] if simulated else []
+    said = [texts["todo_exercise"]] if results.region.simulated else []
     hit = worst[worst["state"].isin(("yes", "likely"))] if "state" in worst else worst
-    said += _inspected(hit, areas, buildings, language) if len(hit) else [texts["todo_none"]]
+    said += _inspected(hit, results) if len(hit) else [texts["todo_none"]]
     # Gaps to be measured, and pairs that come later
     for state in ("unknown", "possible"):
         if tally.states[state]:
@@ -294,13 +210,12 @@ def _first(
     return said
 
 
-def _inspected(
-    hit: pd.DataFrame, areas: pd.DataFrame, buildings: PageBuildings | None, language: Language
-) -> list[str]:
+def _inspected(hit: pd.DataFrame, results: Results) -> list[str]:
     """Return sentences on the first inspections: buildings or pairs, and areas."""
+    language, areas, buildings = results.language, results.areas, results.buildings
     texts, said = LANGUAGES[language], list[str]()
-    if buildings is not None and len(buildings.worst):
-        said.append(texts["todo_buildings"].format(names=_names(buildings.worst["building_id"])))
+    if len(buildings):
+        said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
     else:
         said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
     # One area is no choice

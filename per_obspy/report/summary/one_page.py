@@ -5,7 +5,6 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -13,15 +12,17 @@ from per_obspy.errors import shortened
 from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.overview import draw_map
+from per_obspy.report.results import Results
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
 from per_obspy.report.summary.statements import (
-    SummaryFacts,
+    LISTED,
     first_steps,
     five_numbers,
+    made_sentence,
     station_sentences,
     sureness,
 )
-from per_obspy.report.summary.wording import in_language
+from per_obspy.report.summary.wording import WORDING, in_language
 from per_obspy.report.words import chance_text, length_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
@@ -48,68 +49,73 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
+def write_page(results: Results, path: Path) -> None:
     """
     Write the summary as one page of PDF, whole or not at all.
 
     Parameters
     ----------
-    facts : SummaryFacts
-        Facts of the screening.
-    shown : DataFrame
-        Pairs of the map: ``risk_class, longitude, latitude``.
+    results : Results
+        Of the screening.
     path : Path
         ``.pdf``.
     """
     figure = Figure(figsize=PAGE)
-    at = _write_head(figure, facts)
-    at = _write_numbers(figure, facts, at)
+    at = _write_head(figure, results)
+    at = _write_numbers(figure, results, at)
     bottom = at - 0.30
-    _draw_map(figure, facts, shown, bottom)
-    texts = facts.texts
-    lowest = _write_section(figure, texts["what_first"], first_steps(facts), at, HALF)
-    lowest = _write_section(figure, texts["how_sure"], sureness(facts), lowest, HALF)
-    _write_pairs(figure, facts, min(lowest, bottom))
+    _draw_map(figure, results, bottom)
+    texts = WORDING[results.language]
+    lowest = _write_section(figure, texts["what_first"], first_steps(results), at, HALF)
+    lowest = _write_section(figure, texts["how_sure"], sureness(results), lowest, HALF)
+    _write_pairs(figure, results, min(lowest, bottom))
     # Where the numbers are from
-    figure.text(LEFT, 0.03, literal(shortened(facts.made, 150)), fontsize=7, color=MOTION_COLOUR)
+    figure.text(
+        LEFT, 0.03, literal(shortened(made_sentence(results), 150)), fontsize=7, color=MOTION_COLOUR
+    )
     # The same page has the same bytes
     with written_whole(path) as part:
         figure.savefig(part, metadata={"CreationDate": None})
 
 
-def _draw_map(figure: Figure, facts: SummaryFacts, shown: pd.DataFrame, bottom: float) -> None:
+def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     """Draw the map of the pairs on the right, with its legend."""
-    legend = _write_legend(figure, facts, bottom + 0.005)
+    legend = _write_legend(figure, results, bottom + 0.005)
     box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
-    axes, texts = figure.add_axes(box), facts.texts
-    draw_map(axes, shown, facts.region, around_pairs=True)
+    axes, texts = figure.add_axes(box), WORDING[results.language]
+    draw_map(axes, results.shown, results.region, around_pairs=True)
     # Labels in the language of the summary
-    axes.set_title(texts["map_title"].format(count=len(shown)))
+    axes.set_title(texts["map_title"].format(count=len(results.shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
     axes.tick_params(labelsize=7)
     for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
         text.set_fontsize(8)
 
 
-def _write_head(figure: Figure, facts: SummaryFacts) -> float:
+def _write_head(figure: Figure, results: Results) -> float:
     """Write title, warning, earthquake and stations; return how far the page is filled."""
     at = 0.955
-    for line in wrap(shortened(facts.region.title, 140), 70):
+    for line in wrap(shortened(results.region.title, 140), 70):
         figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
         at -= 0.024
-    if facts.region.simulated:
+    if results.region.simulated:
         figure.text(
-            LEFT, at, facts.texts["simulated"], fontsize=12, color=WARNING_COLOUR, fontweight="bold"
+            LEFT,
+            at,
+            WORDING[results.language]["simulated"],
+            fontsize=12,
+            color=WARNING_COLOUR,
+            fontweight="bold",
         )
         at -= 0.022
     # Whatever has no verdict comes first
-    for place, sentence in enumerate(coverage_sentences(facts.coverage, facts.language)):
-        warns = place == 0 and facts.coverage.lacks_many
+    for place, sentence in enumerate(coverage_sentences(results.coverage, results.language)):
+        warns = place == 0 and results.coverage.lacks_many
         lines = wrap(shortened(sentence, LONGEST_ACCOUNT), WHOLE)
         at = _write_lines(figure, lines, at, WARNING_COLOUR if warns else "black")
     # Sentences one after the other
-    stations = station_sentences(facts.stations, facts.language)
-    for text in (" ".join(facts.source), " ".join(stations)):
+    stations = station_sentences(results.stations, results.language)
+    for text in (" ".join(results.source), " ".join(stations)):
         at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
     return at - 0.01
 
@@ -122,11 +128,11 @@ def _write_lines(figure: Figure, lines: list[str], at: float, colour: str = "bla
     return at
 
 
-def _write_numbers(figure: Figure, facts: SummaryFacts, at: float) -> float:
+def _write_numbers(figure: Figure, results: Results, at: float) -> float:
     """Write the five numbers side by side and return how far the page is filled."""
     # A large number over its meaning
     width = (RIGHT - LEFT) / 5.0
-    for place, (value, meaning) in enumerate(five_numbers(facts)):
+    for place, (value, meaning) in enumerate(five_numbers(results)):
         left = LEFT + place * width
         figure.text(left, at - 0.02, literal(value), fontsize=17, fontweight="bold")
         for row, line in enumerate(wrap(meaning, 22)[:3]):
@@ -146,13 +152,13 @@ def _write_section(
     return at - 0.012
 
 
-def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> float:
+def _write_legend(figure: Figure, results: Results, at: float) -> float:
     """Write the number of pairs of each class in its colour, and return the height of the lines."""
     # Entries as wide as they are drawn, on as many lines as they need between map and margin
     left, line = MAP_LEFT, 0
     entries = list[tuple[Text, Text, int]]()
-    for name, colour in class_colours(facts.region.classes).items():
-        if count := facts.counts.classes.get(name, 0):
+    for name, colour in class_colours(results.region.classes).items():
+        if count := results.tally.classes[name]:
             words = literal(f"{shortened(name, 24)} {count}")
             text = figure.text(0.0, 0.0, words, fontsize=7.5)
             width = 0.016 + text.get_window_extent().width / figure.bbox.width
@@ -168,30 +174,34 @@ def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> float:
     return LEGEND_LINE * line
 
 
-def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
+def _write_pairs(figure: Figure, results: Results, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
-    figure.text(LEFT, at, facts.texts["worst_pairs"], fontsize=11, fontweight="bold")
+    figure.text(LEFT, at, WORDING[results.language]["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
-    _write_row(figure, _titles(facts), at, MOTION_COLOUR)
-    for position, (_, pair) in enumerate(facts.worst.iterrows(), start=1):
-        # As many as the summary lists, one per line
+    _write_row(figure, _titles(results), at, MOTION_COLOUR)
+    # One per line
+    for position, (_, pair) in enumerate(results.listed.head(LISTED).iterrows(), start=1):
+        # As many as the summary lists
         at -= LINE
         cells = (
             str(position),
             shortened(str(pair["pair_id"]), 26),
             shortened(str(pair["risk_class"]), 12),
-            *(in_language(text, facts.language) for text in _number_cells(dict(pair))),
+            *(in_language(text, results.language) for text in _number_cells(dict(pair))),
             f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
         )
         _write_row(figure, cells, at, "black")
-    if not facts.buildings.empty:
-        _write_buildings(figure, facts, at - 2.5 * LINE)
+    if not results.buildings.empty:
+        _write_buildings(figure, results, at - 2.5 * LINE)
 
 
-def _titles(facts: SummaryFacts) -> list[str]:
+def _titles(results: Results) -> list[str]:
     """Return the titles of the columns; an ensemble lacks the needed gap."""
-    hidden = set() if "demand" in facts.worst else {"needed"}
-    return [facts.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
+    hidden = set() if "demand" in results.listed else {"needed"}
+    return [
+        WORDING[results.language][f"head_{key}"] if key and key not in hidden else ""
+        for key in COLUMNS
+    ]
 
 
 def _number_cells(pair: dict[Hashable, Any]) -> list[str]:
@@ -220,10 +230,12 @@ def _fit(text: Text, room: float) -> None:
         text.set_fontsize(8.0 * room / width)
 
 
-def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
+def _write_buildings(figure: Figure, results: Results, at: float) -> None:
     """Write the worst buildings in two columns."""
-    figure.text(LEFT, at, facts.texts["worst_buildings"], fontsize=11, fontweight="bold")
-    for position, building in enumerate(facts.buildings.to_dict("records")):
+    figure.text(
+        LEFT, at, WORDING[results.language]["worst_buildings"], fontsize=11, fontweight="bold"
+    )
+    for position, building in enumerate(results.buildings.head(LISTED).to_dict("records")):
         # Five below each other
         left = LEFT if position < 5 else 0.52
         row = at - 0.02 - LINE * (position % 5)

@@ -8,15 +8,18 @@ from unicodedata import normalize
 from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.page.texts import Language
+from per_obspy.report.results import Results
 from per_obspy.report.summary.statements import (
-    SummaryFacts,
+    LISTED,
     building_sentence,
     first_steps,
     five_numbers,
+    made_sentence,
     pair_sentence,
     station_sentences,
     sureness,
 )
+from per_obspy.report.summary.wording import WORDING
 
 #: Longest line, characters.
 WIDTH = 72
@@ -50,45 +53,50 @@ def spoken(text: str, language: Language = "en") -> str:
     return " ".join(_UNSPOKEN.sub(" ", letters).split())
 
 
-def summary_lines(facts: SummaryFacts) -> list[str]:
+def summary_lines(results: Results) -> list[str]:
     """Return the lines of a summary, none longer than ``WIDTH`` characters."""
     lines = list[str]()
-    for title, sentences in _sections(facts).items():
+    for title, sentences in _sections(results).items():
         if sentences:
             lines += ["", spoken(title).upper()] if title else []
-            plain = (spoken(sentence, facts.language) for sentence in sentences)
+            plain = (spoken(sentence, results.language) for sentence in sentences)
             lines += [line for sentence in plain for line in wrap(sentence, WIDTH)]
     return lines
 
 
-def _sections(facts: SummaryFacts) -> dict[str, list[str]]:
+def _sections(results: Results) -> dict[str, list[str]]:
     """Return the sentences of each section by its title; the first title is empty."""
-    texts, language = facts.texts, facts.language
-    # Whatever has no verdict comes before the earthquake, and before the title if it is much
-    account = coverage_sentences(facts.coverage, language)
-    warned = int(facts.coverage.lacks_many)
-    head = [
-        *account[:warned],
-        facts.region.title[:200],
-        *([texts["simulated_spoken"]] if facts.region.simulated else []),
-        *account[warned:],
-        *facts.source,
-        *station_sentences(facts.stations, language),
-    ]
+    texts, language = WORDING[results.language], results.language
     # Pairs and buildings with their places in the ranking
-    numbers = [f"{value} {meaning}." for value, meaning in five_numbers(facts)]
-    pairs = [pair_sentence(dict(row), language) for _, row in facts.worst.iterrows()]
-    buildings = [building_sentence(dict(row), language) for _, row in facts.buildings.iterrows()]
+    worst, hit = (table.head(LISTED).iterrows() for table in (results.listed, results.buildings))
+    pairs = [pair_sentence(dict(row), language) for _, row in worst]
+    buildings = [building_sentence(dict(row), language) for _, row in hit]
     # In the order of their weight for a listener
     return {
-        "": head,
-        texts["five_numbers"]: numbers,
-        texts["what_first"]: first_steps(facts),
+        "": _head(results),
+        texts["five_numbers"]: [f"{value} {meaning}." for value, meaning in five_numbers(results)],
+        texts["what_first"]: first_steps(results),
         texts["worst_pairs"]: _numbered(pairs),
         texts["worst_buildings"]: _numbered(buildings),
-        texts["how_sure"]: sureness(facts),
-        texts["made_by"]: [facts.made],
+        texts["how_sure"]: sureness(results),
+        texts["made_by"]: [made_sentence(results)],
     }
+
+
+def _head(results: Results) -> list[str]:
+    """Return title, coverage, earthquake and stations."""
+    texts, language = WORDING[results.language], results.language
+    # Whatever has no verdict comes before the earthquake, and before the title if it is much
+    account = coverage_sentences(results.coverage, language)
+    warned = int(results.coverage.lacks_many)
+    return [
+        *account[:warned],
+        results.region.title[:200],
+        *([texts["simulated_spoken"]] if results.region.simulated else []),
+        *account[warned:],
+        *results.source,
+        *station_sentences(results.stations, language),
+    ]
 
 
 def _numbered(sentences: list[str]) -> list[str]:
@@ -96,7 +104,7 @@ def _numbered(sentences: list[str]) -> list[str]:
     return [f"{place}. {sentence}" for place, sentence in enumerate(sentences, start=1)]
 
 
-def write_text(facts: SummaryFacts, path: Path) -> None:
+def write_text(results: Results, path: Path) -> None:
     """Write the summary as text, whole or not at all."""
     with written_whole(path) as part:
-        part.write_text("\n".join([*summary_lines(facts), ""]), encoding="ascii")
+        part.write_text("\n".join([*summary_lines(results), ""]), encoding="ascii")

@@ -1,94 +1,23 @@
-"""Facts of a screening for its summary, and sentences on them."""
+"""Sentences and numbers of the summary of a screening."""
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from importlib.metadata import version
+from typing import Any
 
 import pandas as pd
 
 from per_obspy.report.coverage import coverage_number
-from per_obspy.report.overview import Region
 from per_obspy.report.page.texts import Language
+from per_obspy.report.results import Results
 from per_obspy.report.summary.wording import WORDING, in_language
 from per_obspy.report.words import chance_text, name_text, number, speed_text
-from per_obspy.tables.coverage import Coverage
 
 #: Pairs and buildings that the summary lists.
 LISTED = 10
 
 #: Stations that are named; of more their number is given.
 NAMED = 8
-
-
-class Counts(NamedTuple):
-    """
-    Numbers of the whole risk table.
-
-    Attributes
-    ----------
-    states, classes : mapping of str to int
-        Number of pairs of each state and class.
-    expected : float
-        Expected number of pounding pairs, those of unknown gap left out.
-    derived, far : int
-        Number of pairs with derived inputs, and of pairs far from their station.
-    """
-
-    states: Mapping[str, int]
-    classes: Mapping[str, int]
-    expected: float
-    derived: int
-    far: int
-
-    @property
-    def pairs(self) -> int:
-        """Return the number of pairs."""
-        return sum(self.states.values())
-
-
-class SummaryFacts(NamedTuple):
-    """
-    Facts for a summary.
-
-    Attributes
-    ----------
-    region : Region
-        Title, classes, whether the motion is simulated, stations and epicentre.
-    source : list of str
-        Sentences on the earthquake, spectrum or scenarios.
-    counts : Counts
-        Of all pairs.
-    worst : DataFrame
-        The worst pairs.
-    buildings : DataFrame
-        The worst buildings; empty where there is no table of buildings.
-    stations : DataFrame
-        Rows of ``stations.csv``; empty where there are none.
-    area : str
-        Name and place of the area with most expected pounding; empty if there are no areas.
-    made : str
-        When and with which version the results were made.
-    coverage : Coverage
-        Rows of the pair tables, and those that are left out.
-    language : Language
-        Of its sentences.
-    """
-
-    region: Region
-    source: list[str]
-    counts: Counts
-    worst: pd.DataFrame
-    buildings: pd.DataFrame
-    stations: pd.DataFrame
-    area: str
-    made: str
-    coverage: Coverage
-    language: Language = "en"
-
-    @property
-    def texts(self) -> Mapping[str, str]:
-        """Return the sentences in the language of the summary by their keys."""
-        return WORDING[self.language]
 
 
 def event_sentences(facts: Mapping[str, Any], language: Language = "en") -> list[str]:
@@ -135,18 +64,18 @@ def _map_name(facts: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
     return [texts["shakemap"].format(name=name_text(facts["map"]), version=version)]
 
 
-def five_numbers(facts: SummaryFacts) -> list[tuple[str, str]]:
+def five_numbers(results: Results) -> list[tuple[str, str]]:
     """Return the five numbers of the summary, each with its meaning."""
-    counts, first, texts = facts.counts, facts.region.classes[0], facts.texts
-    pounding = counts.states.get("yes", 0) + counts.states.get("likely", 0)
+    tally, first, language = results.tally, results.region.classes[0], results.language
+    texts, worst = WORDING[language], results.listed.head(LISTED)
     # Of all pairs the worst ones are the fastest
-    fastest = facts.worst["expected_impact_velocity"].max() if len(facts.worst) else math.nan
+    fastest = worst["expected_impact_velocity"].max() if len(worst) else math.nan
     return [
-        coverage_number(facts.coverage, facts.language),
-        (str(pounding), texts["number_pounding"]),
-        (f"{counts.expected:.0f}", texts["number_expected"]),
-        (str(counts.classes.get(first, 0)), texts["number_class"].format(name=name_text(first))),
-        (in_language(speed_text(float(fastest)), facts.language), texts["number_velocity"]),
+        coverage_number(results.coverage, language),
+        (str(tally.states["yes"] + tally.states["likely"]), texts["number_pounding"]),
+        (f"{tally.expected:.0f}", texts["number_expected"]),
+        (str(tally.classes[first]), texts["number_class"].format(name=name_text(first))),
+        (in_language(speed_text(float(fastest)), language), texts["number_velocity"]),
     ]
 
 
@@ -175,32 +104,41 @@ def _named(names: Sequence[str], texts: Mapping[str, str]) -> str:
     return ": " + ", ".join(map(name_text, names[:NAMED])) + more
 
 
-def first_steps(facts: SummaryFacts) -> list[str]:
+def first_steps(results: Results) -> list[str]:
     """Return sentences on first actions."""
-    counts, texts = facts.counts, facts.texts
+    texts, areas = WORDING[results.language], results.areas
     # The rest depends on the results
     steps = [texts["inspect"]]
-    if facts.area:
-        steps.append(texts["area_first"].format(area=facts.area))
-    if unknown := counts.states.get("unknown", 0):
+    # The area with most pounding is worth a name where there are several
+    if len(areas) > 1:
+        most = areas.iloc[int(areas["expected_pounding"].argmax())]
+        place = place_text(float(most["latitude"]), float(most["longitude"]), 4, results.language)
+        area = texts["around"].format(name=name_text(most["area"]), place=place)
+        steps.append(texts["area_first"].format(area=area))
+    if unknown := results.tally.states["unknown"]:
         steps.append(texts["measure"].format(count=unknown))
-    if facts.region.simulated:
+    if results.region.simulated:
         steps.append(texts["exercise"])
     return steps
 
 
-def sureness(facts: SummaryFacts) -> list[str]:
+def sureness(results: Results) -> list[str]:
     """Return sentences on uncertainty."""
-    counts, sentences, texts = facts.counts, list[str](), facts.texts
+    tally, texts = results.tally, WORDING[results.language]
     # States between yes and no
-    middle = sum(counts.states.get(state, 0) for state in ("likely", "possible", "unlikely"))
-    sentences.append(texts["open"].format(count=middle))
-    if counts.derived:
-        sentences.append(texts["derived"].format(count=counts.derived))
-    if counts.far:
-        sentences.append(texts["far"].format(count=counts.far))
-    sentences.append(texts["nature"])
-    return sentences
+    middle = sum(tally.states[state] for state in ("likely", "possible", "unlikely"))
+    sentences = [texts["open"].format(count=middle)]
+    if tally.derived:
+        sentences.append(texts["derived"].format(count=tally.derived))
+    if far := tally.flags["far_station"]:
+        sentences.append(texts["far"].format(count=far))
+    return [*sentences, texts["nature"]]
+
+
+def made_sentence(results: Results) -> str:
+    """Return a sentence on the program and the table of all pairs."""
+    texts = WORDING[results.language]
+    return texts["made"].format(version=version("per_obspy"), table=results.stem)
 
 
 def pair_sentence(pair: Mapping[str, Any], language: Language) -> str:

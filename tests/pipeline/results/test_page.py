@@ -1,7 +1,7 @@
 """
 The page of a run, from its results.
 
-Tests of per_obspy.pipeline.results.page, per_obspy.pipeline.results.page_drawings and
+Tests of per_obspy.pipeline.report, per_obspy.pipeline.results.drawings and
 per_obspy.report.page.drawn_histories.
 """
 
@@ -12,7 +12,7 @@ import shutil
 import pandas as pd
 import pytest
 
-from per_obspy.pipeline.results import page
+from per_obspy.pipeline.results import report_files
 from per_obspy.pipeline.run import report
 
 from ..small_run import page_content, write_configuration
@@ -138,7 +138,7 @@ def test_revision_of_the_run_is_on_the_page(copied):
 
 def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch):
     # catches: those counted that the page shows
-    monkeypatch.setattr(page, "PAGE_PAIRS", 3)
+    monkeypatch.setattr(report_files, "PAGE_PAIRS", 3)
     report(copied / "run.toml")
     buildings = pd.read_parquet(copied / "out" / "buildings.parquet")
     hit = int((buildings["neighbours_that_can_hit"] > 0).sum())

@@ -1,11 +1,7 @@
 """
 Every kind of screening has its summary, overview, layers and workbook, and its pairs are shown.
 
-Tests of per_obspy.pipeline.results.faults, per_obspy.pipeline.results.table_notes,
-per_obspy.pipeline.results.result_files, per_obspy.pipeline.results.layer_sources,
-per_obspy.pipeline.results.run_facts, per_obspy.pipeline.results.station_facts,
-per_obspy.pipeline.results.scenario_runs and per_obspy.pipeline.results.shown_pair too, through
-per_obspy.commands.show and the commands that screen.
+Tests of per_obspy.pipeline.results and of per_obspy.commands.show, through the commands.
 """
 
 import csv
@@ -22,14 +18,11 @@ import pytest
 from pyarrow import parquet
 
 from per_obspy.config import Totals
-from per_obspy.pipeline.results.faults import Report
-from per_obspy.pipeline.results.result_files import Screening, write_results
+from per_obspy.pipeline.results.report_files import Report, TableReader, write_files
 from per_obspy.pipeline.results.run_facts import event_of_run
-from per_obspy.pipeline.results.table_notes import Notes
-from per_obspy.report.overview import Region
+from per_obspy.report.results import Region, Results
 from per_obspy.tables.coverage import Coverage
 from per_obspy.tables.ranked.ranked_table import ranked_table
-from per_obspy.tables.totals import piece_totals
 
 from ...report.page.made_up import CLASSES, pair_table
 from ..small_run import page_content
@@ -231,17 +224,18 @@ def test_a_pair_of_an_ensemble_is_shown_in_words(done, call):
 
 
 def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
-    module = "per_obspy.pipeline.results.result_files"
+    module = "per_obspy.pipeline.results.report_files"
     monkeypatch.setattr(f"{module}.KML_ROWS", 2)
     monkeypatch.setattr("per_obspy.report.layers.kml.ROWS", 2)
     monkeypatch.setattr(f"{module}.SHEET_ROWS", 3)
     table = pair_table(5)
-    notes = Notes(CLASSES)
-    notes.add(table)
+    reader = TableReader(CLASSES, Totals(), 5)
+    reader.add(table)
     report, region = Report([], []), Region("x", list(CLASSES), False, NOWHERE)
-    write_results(
-        Screening(tmp_path, "risk", region, [], Coverage(5, 5), True), notes, table, report
+    results = Results(
+        "risk", region, Coverage(5, 5), tally=reader.tally, listed=reader.listed, shown=reader.shown
     )
+    write_files(results, tmp_path, True, report)
     assert report.faults == []
     kml = (tmp_path / "risk.kml").read_text()
     assert "The worst 2 of 5 pairs; all of them are in risk.parquet." in kml
@@ -255,13 +249,12 @@ def test_pieces_leave_no_memory_behind(tmp_path):
     more = pd.DataFrame(np.full((4000, 100), 0.5), columns=[f"more_{i}" for i in range(100)])
     table = pd.concat([pair_table(4000), more], axis=1)
     parquet.write_table(pa.Table.from_pandas(table), tmp_path / "risk.parquet")
-    notes, totals, before = Notes(CLASSES), [], []
+    reader, before = TableReader(CLASSES, Totals(), 16_000, is_whole=False), []
     for number in range(4):
         with ranked_table([tmp_path / "risk.parquet"]) as file:
             for piece in file.pieces():
                 piece["rank"] += number * len(table)
-                notes.add(piece)
-                totals.append(piece_totals(piece, Totals(), CLASSES))
+                reader.add(piece)
         del piece
         gc.collect()
         before.append(pa.total_allocated_bytes())
@@ -278,16 +271,21 @@ def test_notes_do_not_depend_on_pieces():
             "probability": [0.9, np.nan, 0.1],
             "flags": ["far_station touching", "", "not_far_station_"],
             "derived": ["mass_1", "", ""],
+            "pair_id": ["a", "b", "c"],
+            "expected_impact_velocity": [1.0, np.nan, 0.0],
+            "longitude": [0.0, 0.0, 0.0],
+            "latitude": [0.0, 0.0, 0.0],
         }
     )
     for pieces in ([table], [table[:1], table[1:]], [table[1:], table[:1]]):
-        notes = Notes(["severe"])
+        reader = TableReader(["severe"], Totals(), 3)
         for piece in pieces:
-            notes.add(piece)
+            reader.add(piece)
+        tally = reader.tally
         # an unknown gap adds nothing to what is expected, and is counted
-        assert notes.counts.expected == pytest.approx(1.0)
-        assert (notes.counts.pairs, notes.counts.derived, notes.counts.far) == (3, 1, 1)
-        pd.testing.assert_frame_equal(notes.worst, table)
+        assert tally.expected == pytest.approx(1.0)
+        assert (tally.pairs, tally.derived, tally.flags["far_station"]) == (3, 1, 1)
+        pd.testing.assert_frame_equal(reader.listed, table)
 
 
 def test_headers_tell_the_earthquake_where_no_file_does(tmp_path):

@@ -1,11 +1,12 @@
 """A made-up page: pairs in a grid of streets, with hostile names where asked for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
-from per_obspy.report.page.content import PageData
-from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.results import Drawings, Event, Region, Results
 from per_obspy.tables.coverage import Coverage
 
 CLASSES = ("severe", "high", "moderate", "low")
@@ -97,24 +98,26 @@ def page_data(table, language="en", **changes):
     )
     rejected = pd.DataFrame([["pair", "P9", "pairs.csv", "7", "gap: -1"]])
     rejected.columns = ["kind", "name", "source", "row", "reasons"]
-    data = PageData(
-        title="A made-up quarter",
-        language=language,
-        simulated=True,
-        classes=CLASSES,
-        event=Event("2026-01-02 03:04:05", "", 6.4, (13.0, 43.0, 9000.0), 1, 1),
+    history = {"time": [0.0, 1.0], "one": [-5.0, 5.0], "two": [-9.0, 9.0], "impacts": [[0.4, 0.7]]}
+    results = Results(
+        "risk",
+        Region("A made-up quarter", CLASSES, True, pd.DataFrame()),
+        Coverage(len(table), len(table)),
+        language,
+        Event("2026-01-02 03:04:05", "", 6.4, (13.0, 43.0, 9000.0)),
         tally=tally,
         worst=table.head(PAGE_PAIRS),
         stations=stations,
         areas=areas,
         rejected=rejected,
         rejections=1,
-        buildings=None,
-        outlines=[],
         lines={"coast": [[12.9, 43.0, 13.3, 43.3]], "borders": []},
-        histories={1: {"time": [0.0, 1.0], "one": [-5.0, 5.0], "two": [-9.0, 9.0],
-                       "impacts": [[0.4, 0.7]]}},
+        drawings=Drawings(histories={1: history}),
         provenance=[("made with", "per_obspy")],
-        coverage=Coverage(len(table), len(table)),
-    )  # fmt: skip
-    return data._replace(**changes)
+    )
+    return replace(results, **changes)
+
+
+def with_region(results, **changes):
+    """Return results of another title or with other classes."""
+    return replace(results, region=results.region._replace(**changes))

@@ -6,18 +6,17 @@ per_obspy.report.page.first_screen.
 """
 
 import csv
-import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from per_obspy.report.page.content import PageDrawings
-from per_obspy.report.page.first_screen import Event
+from per_obspy.report.results import Drawings, Event
 
-from .made_up import HOSTILE, page_data, pair_table
+from .made_up import HOSTILE, page_data, pair_table, with_region
 
 #: Seconds for 20 000 pairs, the best of some loads: other work of the machine only adds to it.
 LONGEST_DRAWING = 0.3
@@ -64,7 +63,7 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
 
 
 def test_real_motion_is_not_called_simulated(opened):
-    page = opened(page_data(pair_table(12), simulated=False))
+    page = opened(with_region(page_data(pair_table(12)), simulated=False))
     assert page.page.is_hidden("#simulated")
     assert "SIMULATED" not in page.page.inner_text("body")
 
@@ -290,7 +289,7 @@ def test_hostile_names_of_outlines_and_stations(opened):
         {"station": HOSTILE, "state": "used", "longitude": 13.1, "latitude": 43.1}
     )
     drawn = dict.fromkeys(HOSTILE, STATION)
-    drawings = PageDrawings(drawn, {}, 0, 0)
+    drawings = Drawings(drawn)
     page = opened(page_data(table, outlines=outlines, stations=stations, drawings=drawings))
     for row in range(len(HOSTILE)):
         page.page.click(f"#pairs tbody tr:nth-child({row + 1}) td:nth-child(2) button")
@@ -305,7 +304,7 @@ def test_hostile_names_of_outlines_and_stations(opened):
 
 
 def test_a_station_shows_record_spectra_and_warnings(opened):
-    drawings = PageDrawings({"XX.A1": STATION}, {}, 0, 0)
+    drawings = Drawings({"XX.A1": STATION})
     page = opened(page_data(pair_table(12), drawings=drawings))
     page.page.click("#stations tbody tr:first-child button")
     assert page.page.evaluate("document.activeElement.id") == "station"
@@ -325,7 +324,7 @@ def test_a_station_shows_record_spectra_and_warnings(opened):
 def test_sensitivity_of_a_pair(opened):
     rows = [["period_1", 0.4, 0.9, 0.3, 0.95, "possible", "yes"],
             ["gap", 0.0, 0.1, 1.0, 0.2, "yes", "possible"]]  # fmt: skip
-    drawings = PageDrawings({}, {1: rows}, 2, 1)
+    drawings = Drawings(sensitivity={1: rows}, worst=2, doubtful=1)
     table = pair_table(30).assign(derived="period_1 mass_2 gap")
     page = opened(page_data(table, drawings=drawings))
     page.page.click("#pairs tbody tr:first-child button")
@@ -341,7 +340,7 @@ def test_sensitivity_of_a_pair(opened):
 
 
 def test_revision_is_shown(opened):
-    event = Event("", "2026-01-02 03:04:05", 6.4, None, 1, 1, revision=3, revised="04:12")
+    event = Event("", "2026-01-02 03:04:05", 6.4, revision=3, revised="04:12")
     page = opened(page_data(pair_table(3), event=event))
     assert page.page.inner_text("#revision") == "Revision 3, 04:12 UTC"
 
@@ -401,7 +400,7 @@ def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkey
     monkeypatch.setattr("per_obspy.report.page.tally.PAGE_PAIRS", 4)
     table = pair_table(40)
     data = page_data(table)
-    page = opened(data._replace(worst=table.head(4)))
+    page = opened(replace(data, worst=table.head(4)))
     picture = "document.getElementById('map').toDataURL()"
     whole = page.page.evaluate(picture)
     assert "They follow the filters" in page.page.inner_text("#cells")
@@ -420,7 +419,7 @@ def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkey
 
 
 def test_hostile_names_are_texts_and_no_formulas(opened):
-    page = opened(page_data(pair_table(30, HOSTILE), title=HOSTILE[0]))
+    page = opened(with_region(page_data(pair_table(30, HOSTILE)), title=HOSTILE[0]))
     assert page.page.inner_text("h1") == HOSTILE[0]
     assert page.page.title().startswith("<script>")
     shown = page.column(2)
@@ -450,7 +449,7 @@ def test_policy_forbids_requests_and_foreign_scripts(opened):
 
 
 def test_prints_to_two_pages(opened):
-    page = opened(page_data(pair_table(300, HOSTILE), title="x" * 400))
+    page = opened(with_region(page_data(pair_table(300, HOSTILE)), title="x" * 400))
     document = page.page.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b(?!s)", document)) == 2
 
@@ -530,9 +529,9 @@ MEASURES = {
 @pytest.mark.parametrize("kind", MEASURES)
 def test_none_needed_is_not_said_of_what_is_unknown_or_not_computed(opened, kind, language):
     """Catch a page that calls every pair of a spectrum, or of unknown gap, safe as it is."""
-    page_kind = "run" if kind == "shakemap" else kind
-    event = Event("", "", math.nan, None, 0, 0, "A spectrum or a map.")
-    page = opened(page_data(measures(kind), language, kind=page_kind, histories={}, event=event))
+    stem = "risk" if kind in ("run", "shakemap") else kind
+    event = Event(source="A spectrum or a map.")
+    page = opened(page_data(measures(kind), language, stem=stem, drawings=Drawings(), event=event))
     details = []
     for row in range(1, 5):
         page.page.click(f"#pairs tbody tr:nth-child({row}) button")
@@ -581,8 +580,8 @@ def test_a_table_of_few_columns_has_a_page_too(opened):
     columns += ["demand", "demand_rule", "longitude", "latitude", "per_1"]
     table = pair_table(30)[columns]
     nothing = pd.DataFrame()
-    event = Event("", "", math.nan, None, 0, 0, "Screened by a spectrum.")
-    data = page_data(table, stations=nothing, areas=nothing, histories={}, event=event)
+    event = Event(source="Screened by a spectrum.")
+    data = page_data(table, stations=nothing, areas=nothing, drawings=Drawings(), event=event)
     page = opened(data)
     assert page.page.inner_text("#event") == "Screened by a spectrum."
     page.page.click("#pairs tbody tr:first-child button")

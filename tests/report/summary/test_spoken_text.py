@@ -6,6 +6,7 @@ per_obspy.report.summary.one_page too.
 """
 
 import re
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -13,10 +14,11 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from per_obspy.report.overview import Region
+from per_obspy.report.page.tally import PairTally
+from per_obspy.report.results import Region, Results
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
-from per_obspy.report.summary.statements import Counts, SummaryFacts, event_sentences
+from per_obspy.report.summary.statements import event_sentences
 from per_obspy.report.summary.wording import ENGLISH, SPANISH
 from per_obspy.tables.coverage import Coverage, Search
 
@@ -51,17 +53,19 @@ def make_facts(names=("P1", "P2"), simulated=True, buildings=False):
         {"station": ["XX.A", "XX.B", "XX.C"], "state": ["used", "rejected", "used"]}
     )
     places = pd.DataFrame({"longitude": [-68.0], "latitude": [-20.0]})
-    counts = Counts({"yes": 3, "likely": 2, "possible": 4, "unknown": 7}, {"severe": 5}, 5.4, 6, 0)
-    return SummaryFacts(
+    tally = PairTally(["severe", "low"])
+    tally.states.update({"yes": 3, "likely": 2, "possible": 4, "unknown": 7})
+    tally.classes["severe"], tally.expected, tally.derived = 5, 5.4, 6
+    return Results(
+        "risk",
         Region("old town", ["severe", "low"], simulated, places, (-68.2, -20.2)),
-        event_sentences(EVENT),
-        counts,
-        worst,
-        listed if buildings else pd.DataFrame(),
-        stations,
-        "",
-        "per-obspy 0.1.0.",
         COVERAGE,
+        source=event_sentences(EVENT),
+        tally=tally,
+        listed=worst,
+        shown=worst,
+        buildings=listed if buildings else pd.DataFrame(),
+        stations=stations,
     )
 
 
@@ -79,7 +83,7 @@ def page_text(tmp_path):
                 save(figure, *arguments, **options)
 
             patch.setattr(Figure, "savefig", noted)
-            write_page(facts, facts.worst, tmp_path / "summary.pdf")
+            write_page(facts, tmp_path / "summary.pdf")
         return figures[0], tmp_path / "summary.pdf"
 
     return page_text
@@ -108,7 +112,7 @@ def test_the_summary_says_what_where_and_how_sure():
 @pytest.mark.parametrize("name", HOSTILE)
 def test_every_line_can_be_read_aloud(tmp_path, name):
     facts = make_facts([name] * 10, buildings=True)
-    facts = facts._replace(region=facts.region._replace(title=name))
+    facts = replace(facts, region=facts.region._replace(title=name))
     write_text(facts, tmp_path / "summary.txt")
     lines = (tmp_path / "summary.txt").read_text(encoding="ascii").splitlines()
     assert max(map(len, lines)) <= WIDTH
@@ -155,9 +159,11 @@ def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):
     areas = [("a ward with a long name", 10**6)] * 3
     search = Search(10**6, kinds, kinds, areas)
     facts = make_facts(buildings=True)
-    facts = facts._replace(
+    facts.tally.classes.update(dict.fromkeys([*names, "gap unknown"], 123_456))
+    facts.tally.classes["severe"] = 123_456
+    facts = replace(
+        facts,
         region=facts.region._replace(classes=names),
-        counts=facts.counts._replace(classes=dict.fromkeys([*names, "gap unknown"], 123_456)),
         coverage=Coverage(10**6, 10, kinds, areas, search),
     )
     figure, _ = page_text(facts, monkeypatch)
@@ -185,7 +191,7 @@ def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):
 def test_the_same_facts_are_the_same_bytes(tmp_path):
     # results of a run are compared by their hashes
     for name in ("a.pdf", "b.pdf"):
-        write_page(make_facts(), make_facts().worst, tmp_path / name)
+        write_page(make_facts(), tmp_path / name)
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
 
 
@@ -196,7 +202,7 @@ def test_every_sentence_has_both_languages_with_the_same_places():
 
 
 def test_the_spanish_page_keeps_its_texts_apart(page_text, monkeypatch):
-    facts = make_facts(buildings=True)._replace(language="es")
+    facts = replace(make_facts(buildings=True), language="es")
     figure, _ = page_text(facts, monkeypatch)
     drawn = " ".join(text.get_text() for text in figure.texts)
     assert "Movimiento SIMULADO" in drawn
