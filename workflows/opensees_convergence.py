@@ -14,7 +14,7 @@ import numpy as np
 from paper_records import CHECKOUT
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.history.row_history import pounding_history
+from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.structure import Structure
 
 #: Sampling interval of the record (s), its samples, and number of pairs.

@@ -16,15 +16,15 @@ from per_obspy import (
     single_hit,
     supplemental_damping,
 )
-from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
+from per_obspy.pounding.linearization import ductility_correlation
 from per_obspy.pounding.reliability import (
     SingleHitComparison,
     amplifications,
     compare_single_hit,
     summary,
 )
+from per_obspy.pounding.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.single_hit import SingleHit
-from per_obspy.pounding.yielding.linearization import ductility_correlation
 
 DAMPING, RESTITUTION, MASS = 0.05, 0.65, 1e6  # of every structure and impact; kg
 #: Of the figure on yielding pairs: as Taft 1952 has it, and the lakebed of Mexico City

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.history.row_history import PoundingHistory
 from per_obspy.pounding.reliability import SingleHitComparison, amplifications, summary
+from per_obspy.pounding.row_history import PoundingHistory
 from per_obspy.pounding.single_hit import SingleHit
 from per_obspy.report.spectra import COMPONENT_COLOURS, add_circle, add_state_space
 from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, save

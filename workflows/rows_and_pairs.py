@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 
 DT, SAMPLES = 0.01, 6_000
 

@@ -8,14 +8,20 @@ from tables import write_page
 
 import per_obspy
 
-#: Room of the package -> heading.
+#: Room or page of the package -> heading; pages of one heading are one section.
 ROOMS = {
     "spectra": "Spectra",
     "pounding": "Gaps, impacts and correlation",
     "pounding.correlation": "Correlation of two responses",
-    "pounding.history": "Exact histories",
-    "pounding.mitigation": "Prevention",
-    "pounding.yielding": "Yielding buildings",
+    "pounding.stationary_ground": "Correlation of two responses",
+    "pounding.row_history": "Exact histories",
+    "pounding.pair_histories": "Exact histories",
+    "pounding.relative": "Exact histories",
+    "pounding.contact_elements": "Exact histories",
+    "pounding.bumpers": "Prevention",
+    "pounding.supplemental_damping": "Prevention",
+    "pounding.linearization": "Yielding buildings",
+    "pounding.equivalent_linear": "Yielding buildings",
     "processing": "Processing of records",
     "inventory": "Buildings and pairs",
     "screening": "Screening",
@@ -24,12 +30,12 @@ ROOMS = {
 
 
 def public_names() -> list[tuple[str, str]]:
-    """Return room and name of every public name, in the order of the rooms."""
+    """Return heading and name of every public name, in the order of the headings."""
     stub = (Path(per_obspy.__file__).parent / "__init__.pyi").read_text(encoding="utf-8")
     found = re.findall(r"^from \.([\w.]+) import (\w+) as \w+$", stub, re.MULTILINE)
-    rooms = list(ROOMS)
-    names = [(_room(module), name) for module, name in found]
-    return sorted(names, key=lambda one: (rooms.index(one[0]), one[1]))
+    headings = list(dict.fromkeys(ROOMS.values()))
+    names = [(_heading(module), name) for module, name in found]
+    return sorted(names, key=lambda one: (headings.index(one[0]), one[1]))
 
 
 def write(folder: Path) -> None:
@@ -40,17 +46,16 @@ def write(folder: Path) -> None:
         "used. Units are SI; the examples run as tests.",
         ".. currentmodule:: per_obspy",
     ]
-    for room, group in groupby(public_names(), key=lambda one: one[0]):
+    for heading, group in groupby(public_names(), key=lambda one: one[0]):
         listed = "\n".join(f"   {name}" for _, name in group)
-        heading = ROOMS[room]
         parts.append(f"{heading}\n{'-' * len(heading)}")
         parts.append(f".. autosummary::\n   :toctree: api\n\n{listed}")
     write_page(folder / "api.rst", *parts)
 
 
-def _room(module: str) -> str:
-    """Return the longest room of a module that has a heading."""
+def _heading(module: str) -> str:
+    """Return the heading of a module, by the longest of the rooms that it is in."""
     rooms = [room for room in ROOMS if f"{module}.".startswith(f"{room}.")]
     if not rooms:
         raise KeyError(f"docs/extensions/api_pages.py has no heading for {module}")
-    return max(rooms, key=len)
+    return ROOMS[max(rooms, key=len)]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from api_pages import ROOMS, public_names
+from api_pages import public_names
 
 import per_obspy
 
@@ -23,11 +23,11 @@ BEGIN, END = "Public names\n------------\n", '"""\n\nimport lazy_loader'
 
 
 def listing() -> str:
-    """Return the public names by room, each with the first line of its docstring."""
+    """Return the public names by heading, each with the first line of its docstring."""
     parts = []
-    for room, group in groupby(public_names(), key=lambda one: one[0]):
+    for heading, group in groupby(public_names(), key=lambda one: one[0]):
         lines = (f"{name}\n    {first_line(name)}" for _, name in group)
-        parts.append(f"**{ROOMS[room]}**\n\n" + "\n".join(lines))
+        parts.append(f"**{heading}**\n\n" + "\n".join(lines))
     return "\n\n".join(parts) + "\n"
 
 

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
-from per_obspy.pounding.correlation.record import record_correlation
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation, record_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
-from per_obspy.pounding.history.pair_histories import pounding_histories
-from per_obspy.pounding.history.relative import relative_displacement
+from per_obspy.pounding.pair_histories import pounding_histories
+from per_obspy.pounding.relative import relative_displacement
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.spectra.elastic import response_spectra
 

@@ -15,12 +15,14 @@ import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.kernels._quick import kept_garbage
-from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
-from per_obspy.pounding.history.pair_histories import pounding_histories
-from per_obspy.pounding.history.relative import directional_relative_displacement
-from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
-from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.correlation import worst_azimuth
+from per_obspy.pounding.pair_histories import pounding_histories
+from per_obspy.pounding.relative import (
+    directional_relative_displacement,
+    yielding_relative_displacement,
+)
+from per_obspy.pounding.row_history import pounding_history
+from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
 from per_obspy.progress import Progress
 from per_obspy.screening.risk import risk_table

@@ -16,11 +16,11 @@ import pandas as pd
 from figures import note
 from scipy.signal import lfilter
 
-from per_obspy.pounding.correlation.by_azimuth import directional_correlation
-from per_obspy.pounding.history.relative import (
+from per_obspy.pounding.correlation import directional_correlation
+from per_obspy.pounding.probability import pounding_probability
+from per_obspy.pounding.relative import (
     directional_relative_displacement,
 )
-from per_obspy.pounding.probability import pounding_probability
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.spectra.per_pair import azimuth_maxima
 

@@ -12,7 +12,7 @@ import time
 import numpy as np
 from figures import note
 
-from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.spectra.elastic import per_spectrum
 
 DT, SAMPLES, PAIRS, PEER_PAIRS = 0.01, 12_000, 1024, 4

@@ -12,8 +12,8 @@ import numpy as np
 from figures import note
 from pounding import DT, SAMPLES, record, yardstick
 
-from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.row_history import pounding_history
+from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
 
 MEMBERS, PEERS = 5, 4

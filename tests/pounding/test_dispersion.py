@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.pounding.dispersion import (
+from per_obspy.pounding.probability import (
     combined_dispersion,
     combined_dispersion_correlation,
     lognormal_dispersion,

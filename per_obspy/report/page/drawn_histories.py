@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
+from per_obspy.pounding.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
 from per_obspy.report.pair_figure import motion_along
 

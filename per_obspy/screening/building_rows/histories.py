@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.history.row_maxima import RowMaxima, row_and_pair_maxima
+from per_obspy.pounding.row_maxima import RowMaxima, row_and_pair_maxima
 from per_obspy.screening.building_rows.members import IntArray, members_of
 from per_obspy.screening.values import Columns, Table
 

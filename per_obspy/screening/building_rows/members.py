@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.building_rows.given import is_derived
-from per_obspy.pounding.history.row_maxima import BuildingRows
+from per_obspy.pounding.row_maxima import BuildingRows
 from per_obspy.screening.values import Table, both, values
 
 #: Relative difference of two descriptions of a building beyond which its row is flagged.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 
 

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
-from per_obspy.pounding.history.pair_histories import PoundingMaxima, pounding_histories
-from per_obspy.pounding.history.relative import (
+from per_obspy.pounding.correlation import worst_azimuth
+from per_obspy.pounding.pair_histories import PoundingMaxima, pounding_histories
+from per_obspy.pounding.relative import (
     Approach,
+    YieldingRelativeDisplacement,
     approach,
     directional_relative_displacement,
-)
-from per_obspy.pounding.history.relative_yielding import (
-    YieldingRelativeDisplacement,
     yielding_relative_displacement,
 )
 from per_obspy.screening.by_record.station_motion import StationMotion

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.by_azimuth import directional_correlation
+from per_obspy.pounding.correlation import directional_correlation
 from per_obspy.screening.by_record.station_motion import StationMotion
 from per_obspy.screening.values import Table, both
 from per_obspy.spectra.azimuthal import (

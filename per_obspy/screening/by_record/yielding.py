@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
-from per_obspy.pounding.yielding.equivalent_linear import iwan
-from per_obspy.pounding.yielding.linearization import NARROW, record_bandwidth
+from per_obspy.pounding.equivalent_linear import iwan
+from per_obspy.pounding.linearization import NARROW, record_bandwidth
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import (
     LogSpectra,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.single_hit import SingleHit, single_hit
 from per_obspy.screening.by_record.demand import demand_ratio

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.screening.by_record.stored_spectra import (
     LogSpectra,
     log_period_and_damping,

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.dispersion import lognormal_dispersion
+from per_obspy.pounding.probability import lognormal_dispersion
 from per_obspy.screening.values import Table, both, values
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation, Screening
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.screening.by_record.exact import can_yield
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pairs.node_motion import CORRELATION, DEMAND, MOTION_ROWS, estimate_motion
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.screening.by_record.stored_spectra import (
     LogSpectra,
     log_period_and_damping,

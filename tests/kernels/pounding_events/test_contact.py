@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.kernels.pounding_events import contact, motion
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 MASSES = [(2.0, 1.0), (1.0, 5.0), (1.0, 1.0)]

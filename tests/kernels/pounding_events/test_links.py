@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from per_obspy.kernels.pounding_events import links, motion
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 STRUCTURES = (Structure(0.9, 0.05, 2.0), Structure(0.4, 0.02, 1.0, participation=1.3))

@@ -20,7 +20,7 @@ from per_obspy.kernels.pounding_events.motion import (
     restoring_force,
     taylor_terms,
 )
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 TERMS = 22

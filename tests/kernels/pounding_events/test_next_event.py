@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.kernels.polynomial_roots import value_and_slope
 from per_obspy.kernels.pounding_events import motion, next_event
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 OMEGA = 2.0 * math.pi

@@ -12,8 +12,8 @@ from per_obspy.kernels.pounding_events.row_history import (
     reach_in_free_vibration,
     run_history,
 )
-from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
+from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.structure import Structure
 
 

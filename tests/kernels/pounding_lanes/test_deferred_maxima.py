@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.spectra.elastic import response_spectra
 
 DT = 0.02

@@ -15,7 +15,7 @@ from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 DURATION, GAP, LINES = 0.02, 0.01, 100

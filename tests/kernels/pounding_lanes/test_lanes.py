@@ -14,8 +14,7 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import write_lane
 from per_obspy.kernels.pounding_lanes.lanes import sweep_tile
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair, write_constants, write_phase
-from per_obspy.pounding.history.pair_blocks import pair_table
-from per_obspy.pounding.history.tables import row_at_rest
+from per_obspy.pounding.kernel_tables import pair_table, row_at_rest
 
 LINEAR = {
     "period_1": 0.9, "damping_1": 0.05, "mass_1": 2.0,

@@ -9,7 +9,7 @@ from per_obspy.kernels.pounding_events import motion
 from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes import maxima_in_step as inside
 from per_obspy.kernels.pounding_lanes.pair_rows import store_pair, write_constants, write_phase
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 DURATION = 0.02

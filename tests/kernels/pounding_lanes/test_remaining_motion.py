@@ -6,8 +6,8 @@ from numpy.testing import assert_array_equal
 
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.remaining_motion import remains_still
-from per_obspy.pounding.history import pair_blocks
-from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding import kernel_tables
+from per_obspy.pounding.pair_histories import pounding_histories
 
 DT = 0.02
 
@@ -47,8 +47,8 @@ def _short_and_whole(monkeypatch, record, pairs):
         found = pair_blocks_records(*arguments)
         return {n: one._replace(sizes=np.full_like(one.sizes, 1e30)) for n, one in found.items()}
 
-    pair_blocks_records = pair_blocks.records_in_steps
-    monkeypatch.setattr(pair_blocks, "records_in_steps", never_still)
+    pair_blocks_records = kernel_tables.records_in_steps
+    monkeypatch.setattr(kernel_tables, "records_in_steps", never_still)
     return short, pounding_histories(record, DT, **pairs)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.pounding.history.pair_histories import pounding_histories
-from per_obspy.pounding.history.row_history import pounding_history
+from per_obspy.pounding.pair_histories import pounding_histories
+from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.structure import Structure
 
 PULSE = -4.0 * np.sin(2 * np.pi * np.arange(40) * 0.02 / 0.8)

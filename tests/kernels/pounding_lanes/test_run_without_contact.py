@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
+from per_obspy.pounding.relative import yielding_relative_displacement
 
 
 def test_a_structure_that_yields_moves_by_its_closed_form():

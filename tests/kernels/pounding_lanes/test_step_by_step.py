@@ -18,7 +18,7 @@ from per_obspy.kernels.pounding_lanes.step_by_step import (
     step_through_tile,
     write_back,
 )
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 DURATION, LINES = 0.01, 1000

@@ -23,7 +23,7 @@ from per_obspy.kernels.pounding_lanes.pair_rows import (
     write_phase,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 DURATION, LIMIT, PLASTIC, LOG = 0.02, 0.01, 0.004, np.zeros((0, 9))

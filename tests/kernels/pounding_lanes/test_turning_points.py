@@ -14,7 +14,7 @@ from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.free_impacts import state_inside_step
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, turning_point
 from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
-from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 DURATION = 0.02

@@ -13,10 +13,10 @@ from per_obspy.kernels.pounding_rows.remaining_row_motion import (
     REACH,
     row_remains_still,
 )
-from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
-from per_obspy.pounding.history.rows import row_blocks
-from per_obspy.pounding.history.tables import structure_table
+from per_obspy.pounding import row_maxima as rows_page
+from per_obspy.pounding.kernel_tables import structure_table
+from per_obspy.pounding.row_history import pounding_history
+from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
 
 DT = 0.02
@@ -66,8 +66,8 @@ def test_rows_are_the_same_bits_as_through_the_whole_record(monkeypatch):
         found = records_in_steps(*arguments)
         return {n: one._replace(sizes=np.full_like(one.sizes, 1e30)) for n, one in found.items()}
 
-    records_in_steps = row_blocks.records_in_steps
-    monkeypatch.setattr(row_blocks, "records_in_steps", never_still)
+    records_in_steps = rows_page.records_in_steps
+    monkeypatch.setattr(rows_page, "records_in_steps", never_still)
     whole = row_maxima(north, east, DT, rows)
     for name in whole._fields:
         assert_array_equal(getattr(short, name), getattr(whole, name), err_msg=name)

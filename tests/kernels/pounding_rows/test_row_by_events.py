@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.pounding.history.pair_blocks import KeptLogs, records_in_steps
-from per_obspy.pounding.history.rows.row_blocks import run_logged_block
+from per_obspy.pounding.kernel_tables import KeptLogs, records_in_steps
+from per_obspy.pounding.row_maxima import run_logged_block
 
 
 def start_of(count):

@@ -24,8 +24,8 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     VELOCITY,
 )
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
-from per_obspy.pounding.history.row_history import pounding_history
-from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.row_history import pounding_history
+from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
 
 PULSE = -4.0 * np.sin(2 * np.pi * np.arange(40) * 0.02 / 0.8)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.screening.building_rows.histories import OUTCOMES, no_outcomes, row_outcomes
 
 from .terraces import contacts, motion, turned

@@ -8,7 +8,7 @@ from screening_samples import make_pairs, make_station, table_of
 import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
+from per_obspy.pounding.relative import yielding_relative_displacement
 from per_obspy.screening.by_record import exact
 from per_obspy.screening.by_record.exact import (
     EXACT_COLUMNS,

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import make_station, table_of
 
 import per_obspy
-from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
+from per_obspy.pounding.relative import yielding_relative_displacement
 from per_obspy.screening.by_record.exact_damping import (
     HALVINGS,
     SCAN_STEP,

@@ -7,7 +7,7 @@ from scipy.interpolate import RegularGridInterpolator
 from screening_samples import make_station, table_of
 
 import per_obspy
-from per_obspy.pounding.yielding.equivalent_linear import iwan
+from per_obspy.pounding.equivalent_linear import iwan
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS

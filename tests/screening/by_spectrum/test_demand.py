@@ -7,7 +7,7 @@ from screening_samples import make_pairs
 
 from per_obspy.config import Building, Screening
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.by_spectrum.demand import (

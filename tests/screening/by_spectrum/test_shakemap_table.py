@@ -12,7 +12,7 @@ import per_obspy
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback, shakemap_rows

@@ -10,7 +10,7 @@ from screening_samples import make_pairs, make_station, table_of
 
 import per_obspy
 from per_obspy.config import Screening
-from per_obspy.pounding.history.relative import directional_relative_displacement
+from per_obspy.pounding.relative import directional_relative_displacement
 from per_obspy.records.text_table import read_columns
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.uncertainty import estimated, exact_demand

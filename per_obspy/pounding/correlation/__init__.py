@@ -1,1 +1,0 @@
-"""Correlate the displacements of two oscillators: white noise, ground spectra and records."""

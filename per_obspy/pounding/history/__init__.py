@@ -1,1 +1,0 @@
-"""Integrate exact pounding histories of pairs and rows of structures."""

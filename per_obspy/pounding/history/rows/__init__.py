@@ -1,1 +1,0 @@
-"""Rows of buildings as tables and blocks for the kernels."""

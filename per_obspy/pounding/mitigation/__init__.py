@@ -1,1 +1,0 @@
-"""Size the measures that prevent or soften pounding: damping, bumpers and links."""

@@ -1,0 +1,410 @@
+"""Exact pounding history of two adjacent structures, or of a row of them, with its energies."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+import pandas as pd
+
+from per_obspy import checks
+from per_obspy.checks import ArrayLike, FloatArray
+from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
+    LOG_COLUMNS,
+    SLOWEST_COUNTED,
+)
+from per_obspy.kernels.pounding_events.row_history import run_history
+from per_obspy.pounding.kernel_tables import (
+    closed_record,
+    free_samples,
+    largest_ground_velocity,
+    refinement,
+    row_at_rest,
+    structure_table,
+)
+from per_obspy.pounding.structure import Structure
+from per_obspy.spectra.trace_arguments import takes_trace
+
+
+class Energies(NamedTuple):
+    """
+    Energies of each structure over time, each (n_structures, n_time), J.
+
+    NaN where the mass is infinite. By eq. (3) and (4), ``kinetic + damping + elastic + hysteretic +
+    transfer = input``.
+
+    Attributes
+    ----------
+    input : ndarray
+        Work of the ground, relative formulation, ``-m ∫ a v dt``.
+    kinetic : ndarray
+        ``m v² / 2``.
+    damping : ndarray
+        Dissipated by viscous damping, ``∫ c v² dt``.
+    elastic : ndarray
+        Recoverable deformation energy; ``k u² / 2`` if linear.
+    hysteretic : ndarray
+        Dissipated by yielding; 0 if linear.
+    transfer : ndarray
+        Given to the neighbours by impacts and contact forces, ``∫ f v dt``; negative if received.
+    """
+
+    input: FloatArray
+    kinetic: FloatArray
+    damping: FloatArray
+    elastic: FloatArray
+    hysteretic: FloatArray
+    transfer: FloatArray
+
+
+def energies_of(table: FloatArray, motion: FloatArray, work: FloatArray) -> Energies:
+    """
+    Compute the energies of a motion and of the work done along it.
+
+    Parameters
+    ----------
+    table : (n_structures, 6) ndarray
+        Half damping rate (1/s), squared frequency (rad²/s²), hardening, yield displacement (m),
+        participation, mass (kg).
+    motion : (n_time, n_structures, 3) ndarray
+        Displacement (m), velocity (m/s), plastic displacement (m).
+    work : (n_time, n_structures, 4) ndarray
+        Input, damping, hysteretic and transferred energy, J.
+
+    Returns
+    -------
+    Energies
+        In J.
+    """
+    _, stiffness, hardening, limit, _, mass = table.T
+    mass = np.where(np.isinf(mass), np.nan, mass)
+    displacement, velocity, plastic = np.moveaxis(motion, 2, 0)
+    kinetic = 0.5 * mass * velocity**2
+
+    # Recoverable energy: a spring of the hardened stiffness, and one that slips
+    stretch = np.where(np.isinf(limit), displacement, displacement - plastic)
+    squares = hardening * displacement**2 + (1.0 - hardening) * stretch**2
+    elastic = 0.5 * mass * stiffness * squares
+
+    # Work done along the motion, NaN for structures of infinite mass
+    done, damping, hysteretic, transfer = np.moveaxis(work + 0.0 * mass[:, np.newaxis], 2, 0)
+    return Energies(done.T, kinetic.T, damping.T, elastic.T, hysteretic.T, transfer.T)
+
+
+def closure_of(energies: Energies) -> float:
+    """
+    Compute the largest imbalance of (3), (4) over the largest input or transferred energy.
+
+    Parameters
+    ----------
+    energies : Energies
+        Of all structures, J.
+
+    Returns
+    -------
+    float
+        Dimensionless; structures of infinite mass are left out, and one that never moves counts as
+        balanced.
+    """
+    # Left side of (3), (4)
+    stored = energies.kinetic + energies.damping + energies.elastic
+    spent = stored + energies.hysteretic + energies.transfer
+    finite = ~np.isnan(energies.input[:, 0])
+    imbalance = np.abs(spent - energies.input)[finite].max(axis=1, initial=0.0)
+
+    # Relative to the larger of input and transfer of each structure
+    exchanged = np.maximum(np.abs(energies.input), np.abs(energies.transfer))
+    scale = exchanged[finite].max(axis=1, initial=0.0)
+    share = np.divide(imbalance, scale, out=np.zeros_like(scale), where=scale > 0)
+    return float(share.max(initial=0.0))
+
+
+#: Bouncing ends in contact once the separation speed is below this share of the largest ground
+#: velocity.
+SPEED_SHARE = 1e-11
+#: Impacts within one sampling interval after which structures that are pressed together stay in
+#: contact.
+BOUNCES_OF_ROWS = 100_000
+#: Impacts for which there is room at first.
+FIRST_ROOM = 1000
+#: Columns of the kernels' log of impacts.
+LOGGED = [
+    "time",
+    "left",
+    "velocity_before_1",
+    "velocity_after_1",
+    "velocity_before_2",
+    "velocity_after_2",
+    "impulse",
+    "displacement_1",
+    "displacement_2",
+]
+
+
+class PoundingHistory(NamedTuple):
+    """
+    Motion, impacts and energies of a row of structures.
+
+    Attributes
+    ----------
+    time : (n_time,) ndarray
+        Since the first sample of the record, s.
+    displacement, velocity, plastic_displacement : (n_structures, n_time) ndarray
+        At contact level, relative to the ground, positive towards the last structure, m and m/s; at
+        the instant of an impact the velocity after it.
+    impacts : DataFrame
+        One row per impact: ``time`` (s), ``left`` (index of the structure left of the gap),
+        ``velocity_before_i``, ``velocity_after_i`` (m/s), ``displacement_i`` (m),
+        ``transfer_energy_i`` (J) for the left (1) and right (2) structure, ``impulse`` (N s),
+        ``energy_loss`` (J), and ``counted``: whether it is faster than 1 mm/s and than 1 % of the
+        fastest of its gap, as the impacts of `PoundingMaxima` are.
+    per : (n_structures,) ndarray
+        Largest radius ``sqrt(u² + (v / omega)²)`` with pounding, exact between samples, m.
+    displacement_maxima : (n_structures,) ndarray
+        Largest displacement to either side, exact between samples, m.
+    energy_radius : (n_structures,) ndarray
+        Largest radius of the recoverable energy, ``sqrt(2 E / (m omega²))``, m; equal to ``per`` if
+        linear.
+    opening_maxima : (n_structures - 1,) ndarray
+        Largest opening of each gap beyond its width at rest, ``max(u_right - u_left)``, exact
+        between samples, m.
+    energies : Energies
+        Of each structure over time, J.
+    closure : float
+        Largest imbalance of (3), (4) over the largest input (or transferred) energy of the
+        structure, dimensionless.
+    """
+
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    plastic_displacement: FloatArray
+    impacts: pd.DataFrame
+    per: FloatArray
+    displacement_maxima: FloatArray
+    energy_radius: FloatArray
+    opening_maxima: FloatArray
+    energies: Energies
+    closure: float
+
+
+class _KernelRun(NamedTuple):
+    """
+    Arrays that the kernel has filled.
+
+    ``row`` (n_structures, COLUMNS) at the end, ``log`` (n_impacts, 9), and per sample ``motion``
+    (n_time, n_structures, 3) and ``work`` (n_time, n_structures, 4).
+    """
+
+    row: FloatArray
+    log: FloatArray
+    motion: FloatArray
+    work: FloatArray
+
+
+@takes_trace
+def pounding_history(
+    acceleration: ArrayLike,
+    dt: float,
+    structures: Sequence[Structure],
+    gaps: ArrayLike,
+    restitution: ArrayLike,
+    free_vibration: bool = True,
+) -> PoundingHistory:
+    """
+    Compute the exact history of structures that hit each other, with impacts (7), (8).
+
+    Between events every structure follows the exact solution for ground acceleration that is linear
+    between samples; contacts are the first roots of the clearance on that solution. Structures that
+    touch without bouncing (restitution 0, the end of a chatter, no gap) move together until the
+    contact force would turn into tension. In a row, impacts at one instant are taken pair by pair
+    from left to right until no touching pair approaches, so that the result of simultaneous hits
+    depends on the order of the row.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like or obspy Trace
+        Ground acceleration, positive from the first structure towards the last, m/s². If it does
+        not end at zero, it is closed by one ramp of length dt.
+    dt : float
+        Sampling interval, s; not given with a Trace.
+    structures : sequence of Structure
+        From left to right, two or more.
+    gaps : float or (n_structures - 1,) array_like
+        Clear distances at rest, m; 0 starts in contact.
+    restitution : float or (n_structures - 1,) array_like
+        Coefficient of each gap, between 0 and 1.
+    free_vibration : bool
+        Go on after the record as long as a gap can close or a displacement grow, at most 20 of the
+        longest period; else the history ends with the record's last sample.
+
+    Returns
+    -------
+    PoundingHistory
+        Motion at the samples, impacts, maxima and energies.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range, or there are not N - 1 gaps for N structures.
+
+    Notes
+    -----
+    Impact sequences are chaotic: after some ten impacts two correct programs may differ.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq.
+    (1)-(8).
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> history = pounding_history(pulse, 0.01, [tower, annex], 0.02, 0.6)
+    >>> bool(history.closure < 1e-10), bool((history.impacts["energy_loss"] > 0).all())
+    (True, True)
+    """
+    record = checks.record("acceleration", acceleration)
+    step = checks.number("dt", dt, checks.positive)
+    gap, bounce = _checked_gaps(gaps, restitution, len(structures))
+    table = structure_table(structures)
+    _refuse_pressed_walls(table[:, 5], gap)
+
+    # Follow the free vibration after the record
+    samples = record.size
+    if free_vibration:
+        record = closed_record(record)
+        samples = record.size + free_samples(max(s.period for s in structures), step)
+    run = _run(record, step, table, gap, bounce, samples)
+    return _history(step, table, run)
+
+
+def _history(dt: float, table: FloatArray, run: _KernelRun) -> PoundingHistory:
+    """Return motion, impacts, maxima and energies by name."""
+    row = run.row
+    displacement, velocity, plastic = np.moveaxis(run.motion, 0, 2).swapaxes(0, 1).copy()
+
+    # Energy balance (3), (4)
+    energies = energies_of(table, run.motion, run.work)
+    return PoundingHistory(
+        time=dt * np.arange(len(run.motion), dtype=np.float64),
+        displacement=displacement,
+        velocity=velocity,
+        plastic_displacement=plastic,
+        impacts=impact_table(run.log),
+        per=np.sqrt(row[:, columns.LARGEST_RADIUS_SQUARED]),
+        displacement_maxima=row[:, columns.LARGEST_DISPLACEMENT].copy(),
+        energy_radius=np.sqrt(row[:, columns.LARGEST_ENERGY_RADIUS_SQUARED]),
+        opening_maxima=row[:-1, columns.OPENING].copy(),
+        energies=energies,
+        closure=closure_of(energies),
+    )
+
+
+def _run(
+    record: FloatArray,
+    step: float,
+    table: FloatArray,
+    gap: FloatArray,
+    bounce: FloatArray,
+    samples: int,
+) -> _KernelRun:
+    """Run the kernel, a second time if the log of impacts was too short."""
+    parts = refinement(math.sqrt(table[:, 1].max()), step)
+    motion, work = np.zeros((samples, len(table), 3)), np.zeros((samples, len(table), 4))
+
+    # Each run of the kernel starts at rest
+    start = _row_at_start(record, step, table, gap, bounce)
+
+    # Grow the log until all impacts have room
+    room, impacts = -1, FIRST_ROOM
+    while room < impacts:
+        room = impacts
+        row, log = start.copy(), np.zeros((room, LOG_COLUMNS))
+        used = run_history(record, step, parts, row, log, motion, work)
+        if used < 0:
+            _raise_endless(-used * step)
+        impacts = int(row[:, columns.IMPACTS].sum())
+    return _KernelRun(row, log[:impacts], motion[:used], work[:used])
+
+
+def _row_at_start(
+    record: FloatArray, step: float, table: FloatArray, gap: FloatArray, bounce: FloatArray
+) -> FloatArray:
+    """Return the row at rest, with the limits at which bouncing ends in contact."""
+    row = row_at_rest(table, gap, bounce)
+    velocity = SPEED_SHARE * largest_ground_velocity(record, step)
+    row[0, columns.STICKING_SPEED] = velocity * table[:, 4].max()
+    row[0, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS
+    return row
+
+
+def _raise_endless(time: float) -> NoReturn:
+    """Raise the error of contacts that have no end, at a time in s."""
+    raise RuntimeError(f"no end of contacts at {time:g} s: more than {2 * BOUNCES_OF_ROWS} events")
+
+
+def impact_table(log: FloatArray) -> pd.DataFrame:
+    """
+    Return the table of impacts.
+
+    Parameters
+    ----------
+    log : (n_impacts, 9) ndarray
+        Time (s), left structure, velocity before and after of the left and the right one (m/s),
+        impulse (N s), displacement of both (m).
+
+    Returns
+    -------
+    DataFrame
+        As in `PoundingHistory`.
+    """
+    table = pd.DataFrame(log, columns=LOGGED).astype({"left": np.int64})
+
+    # Transfer energies (9), (10) in their short form: impulse times mean velocity
+    for i, sign in ((1, 1.0), (2, -1.0)):
+        mean = 0.5 * (table[f"velocity_before_{i}"] + table[f"velocity_after_{i}"])
+        table[f"transfer_energy_{i}"] = sign * table["impulse"] * mean
+    loss = table["transfer_energy_1"] + table["transfer_energy_2"]
+
+    # Chatter of structures that are pressed together does not count
+    approach = table["velocity_before_1"] - table["velocity_before_2"]
+    fastest = approach.groupby(table["left"]).transform("max")
+    counted = approach > np.maximum(SLOWEST_COUNTED, COUNTED_SHARE * fastest)
+    return table.assign(energy_loss=loss, counted=counted)
+
+
+def _checked_gaps(
+    gaps: ArrayLike, restitution: ArrayLike, structures: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return gap and restitution of each gap of a row of structures."""
+    gap = _for_each_gap("gaps", checks.not_negative("gaps", gaps), structures)
+    coefficient = checks.between("restitution", restitution, 0.0, 1.0)
+    return gap, _for_each_gap("restitution", coefficient, structures)
+
+
+def _for_each_gap(name: str, values: FloatArray, structures: int) -> FloatArray:
+    """Return one value per gap."""
+    if structures < 2:
+        raise ValueError(f"structures must be two or more, got {structures}")
+    if values.shape not in {(), (1,), (structures - 1,)}:
+        raise ValueError(
+            f"{name} must be one number or {structures - 1}, one a gap, "
+            f"got the shape {values.shape}"
+        )
+    return np.array(np.broadcast_to(values, structures - 1))
+
+
+def _refuse_pressed_walls(mass: FloatArray, gap: FloatArray) -> None:
+    """Refuse two walls (infinite masses) with an interface or without a gap between them."""
+    walls = np.flatnonzero(np.isinf(mass))
+    for left, right in pairwise(walls):
+        if right == left + 1 or not gap[left:right].any():
+            raise ValueError(
+                f"mass of structures {left} and {right} is infinite, "
+                "with no room to move between them"
+            )

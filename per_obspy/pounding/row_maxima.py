@@ -1,0 +1,533 @@
+"""Largest responses of rows of buildings against one record, in blocks of 32 lanes."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
+from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
+from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
+from per_obspy.kernels.pounding_lanes.run_block import run_block
+from per_obspy.kernels.pounding_rows.pieces import STATE_COLUMNS
+from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
+from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
+from per_obspy.kernels.pounding_rows.run_rows import run_rows
+from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
+from per_obspy.pounding.kernel_tables import (
+    KeptLogs,
+    aligned,
+    closed_record,
+    free_samples,
+    largest_ground_velocity,
+    records_in_steps,
+    refinement,
+    run_blocks,
+)
+from per_obspy.pounding.pair_histories import SHORTEST_BOUNCE
+from per_obspy.pounding.row_history import SPEED_SHARE
+from per_obspy.pounding.row_tables import (
+    BUILDING_FIELDS,
+    RowScales,
+    building_table,
+    checked_rows,
+    parts_of,
+    row_scales,
+    run_in_parts,
+)
+from per_obspy.pounding.row_tables import (
+    BuildingRows as BuildingRows,
+)
+from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.threads import map_in_threads
+
+IntArray = NDArray[np.int64]
+
+#: Impacts of a row that may count for which there is room at first.
+FIRST_ROOM = 1 << 14
+
+#: Impacts of a row that may count at most: their log takes 300 MB. Touching rows whose masses
+#: differ by a factor of a million have more.
+MOST_IMPACTS = 1 << 22
+
+#: Rows of which a block keeps the logs: as many rows of three buildings as it has.
+MOST_ROWS = PAIR_LANES // 3
+
+
+def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArray]:
+    """
+    Return the rows of each block: of equal refinement, 32 buildings at most in all.
+
+    Parameters
+    ----------
+    first : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    parts : (n_rows,) ndarray of int
+        Steps of a sampling interval.
+    some : (n,) ndarray of int
+        Numbers of the rows that are packed.
+
+    Returns
+    -------
+    list of ndarray of int
+        Numbers of the rows; a row of more than 32 buildings is a separate block.
+    """
+    sizes = np.diff(first)
+    blocks = []
+    for part in np.unique(parts[some]):
+        block: list[int] = []
+        used = 0
+        for number in some[parts[some] == part].tolist():
+            # The next block begins where a row has no room
+            if used + sizes[number] > PAIR_LANES and block:
+                blocks.append(np.array(block))
+                block, used = [], 0
+            block.append(number)
+            used += int(sizes[number])
+        blocks.append(np.array(block))
+    return blocks
+
+
+def run_row_blocks(
+    ground: FloatArray,
+    dt: float,
+    first: IntArray,
+    lines: FloatArray,
+    parts: IntArray,
+    free_steps: IntArray,
+    azimuth: FloatArray,
+    scale: FloatArray,
+) -> IntArray:
+    """
+    Carry all rows through a record and the free vibration after it, on all processors.
+
+    Parameters
+    ----------
+    ground : (2, n_samples) ndarray
+        North and east acceleration, m/s².
+    dt : float
+        Sampling interval, s.
+    first : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    lines : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at rest; then at the end.
+    parts, free_steps : (n_rows,) ndarray of int
+        Steps of a sampling interval, and sampling intervals of free vibration at most.
+    azimuth : (n_rows,) ndarray
+        Of the axis of each row, rad.
+    scale : (n_buildings,) ndarray
+        Of the clearance after each building, see `row_scales`.
+
+    Returns
+    -------
+    (n_buildings,) ndarray of int
+        Impacts that count, see `count_row_impacts`.
+
+    Raises
+    ------
+    RuntimeError
+        If a step has more events than any record causes.
+    """
+    sizes = np.diff(first)
+    # Rows of two are pairs, of which a block has more
+    counts = np.zeros(len(lines), dtype=np.int64)
+    left, steps = _pairs(first, parts, free_steps, azimuth)
+    counts[left] = _run_pairs(ground, dt, left, lines, steps)
+    records = records_in_steps(ground, parts, dt)
+    kept = KeptLogs(MOST_ROWS, FIRST_ROOM)
+
+    def run(block: IntArray) -> None:
+        """Run the rows of one block, and write their results to their places."""
+        # Blocks do not depend on each other
+        members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
+        record = records[int(parts[block[0]])]
+        others = azimuth[block], free_steps[block]
+        start, own = lines[members], sizes[block]
+        found = _counted_block(record, start, own, others, scale[members], kept)
+        lines[members], counts[members] = found
+
+    map_in_threads(run, packed_rows(first, parts, np.flatnonzero(sizes != 2)))
+    return counts
+
+
+def _pairs(
+    first: IntArray, *columns_of_rows: NDArray[Any]
+) -> tuple[IntArray, tuple[NDArray[Any], ...]]:
+    """Return the left buildings of rows of two, and columns of these rows."""
+    pairs = np.flatnonzero(np.diff(first) == 2)
+    return first[pairs], tuple(column[pairs] for column in columns_of_rows)
+
+
+def _run_pairs(
+    ground: FloatArray,
+    dt: float,
+    left: IntArray,
+    lines: FloatArray,
+    steps: tuple[NDArray[Any], ...],
+) -> IntArray:
+    """Carry rows of two from their left buildings through a record; return impacts that count."""
+    both = left[:, np.newaxis] + np.arange(2)
+    rows = lines[both]
+    counts = run_blocks(run_block, LANE_ROWS, ground, dt, rows, *steps)
+    lines[both] = rows
+    return counts
+
+
+def _counted_block(
+    record: Record,
+    start: FloatArray,
+    sizes: IntArray,
+    others: tuple[FloatArray, IntArray],
+    scale: FloatArray,
+    kept: KeptLogs,
+) -> tuple[FloatArray, IntArray]:
+    """Return the buildings of one block at the end, and impacts that count."""
+    firsts = np.concatenate([[0], np.cumsum(sizes)])
+    own, logs = run_logged_block(record, start, firsts, *others, kept)
+    # Row by row
+    counts = []
+    for begin, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
+        counts.append(count_row_impacts(own[begin:end], log, scale[begin:end]))
+    kept.keep(logs)
+    return own, np.concatenate(counts)
+
+
+def run_logged_block(
+    record: Record,
+    start: FloatArray,
+    firsts: IntArray,
+    azimuth: FloatArray,
+    free: IntArray,
+    kept: KeptLogs,
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Carry the rows of one block through a record, with a log of every impact.
+
+    Parameters
+    ----------
+    record : Record
+        Ground motion and the steps through it.
+    start : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at rest.
+    firsts : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    azimuth : (n_rows,) ndarray
+        Of the axis of each row, rad.
+    free : (n_rows,) ndarray of int
+        Sampling intervals of free vibration at most.
+    kept : KeptLogs
+        Memory of the logs; to be given back.
+
+    Returns
+    -------
+    lines : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at the end.
+    logs : (n_rows, n_lines, LOG_COLUMNS) ndarray
+        All impacts of each row that may count.
+
+    Raises
+    ------
+    RuntimeError
+        If a step has more events than any record causes, or a row too many impacts.
+    """
+    direction = np.cos(azimuth), np.sin(azimuth)
+    room = kept.impacts
+    # Grow the logs until all impacts of every row have room
+    while True:
+        logs = kept.room(firsts.size - 1, room)
+        # The kernels change the lines and the steps of free vibration
+        own = start.copy()
+        if len(own) > PAIR_LANES:
+            is_through = _run_alone(record, own, logs[0], direction, int(free[0]))
+        else:
+            is_through = _run_in_lanes(record, own, logs, firsts, direction, free.copy())
+        if not is_through:
+            raise RuntimeError("no end of events in a step of a row")
+        impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
+        if impacts <= room:
+            return own, logs
+        if impacts > MOST_IMPACTS:
+            raise RuntimeError(f"a row has {impacts} impacts that may count, most {MOST_IMPACTS}")
+        kept.keep(logs)
+        room = impacts
+
+
+def _run_alone(
+    record: Record, row: FloatArray, log: FloatArray, direction: tuple[FloatArray, ...], free: int
+) -> bool:
+    """Run a row of more buildings than there are lanes; return whether it got through."""
+    north, east = record.components
+    cosine, sine = (float(component[0]) for component in direction)
+    dt = record.duration * record.refinement
+    run = run_row_by_events(north, east, cosine, sine, dt, record.refinement, row, log, free)
+    return bool(run)
+
+
+def _run_in_lanes(
+    record: Record,
+    own: FloatArray,
+    logs: FloatArray,
+    firsts: IntArray,
+    direction: tuple[FloatArray, ...],
+    free: IntArray,
+) -> bool:
+    """Run the rows of a block in lanes; return whether all got through."""
+    lines = np.zeros((PAIR_LANES, columns.ROW_COLUMNS))
+    lines[: len(own)] = own
+    lanes = aligned(LANE_ROWS * PAIR_LANES)
+    flags = aligned(PAIR_LANES).view(np.int64)
+    grounds = np.empty((2, 2, TILE_STEPS + 1))
+
+    # Lanes as lines, states of a step and deferred tiles
+    members = np.zeros((PAIR_LANES, LANE_ROWS))
+    states = np.zeros((PAIR_LANES, STATE_COLUMNS))
+    deferred = np.zeros((PAIR_LANES, DEFERRED_COLUMNS))
+    memory = members, lines, logs, states, deferred, aligned(WINDOW_SIZE)
+    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, *direction, free)
+    own[:] = lines[: len(own)]
+    return bool(is_through)
+
+
+#: Bouncing ends in contact after this many impacts per interface in one step. Chatter at one
+#: interface disturbs that at the others, the more the less alike the masses are. With 400, maxima
+#: of two of 1 850 rows of the demonstration were off by up to a sixth, and of touching rows whose
+#: masses alternate by a factor of 100 by up to a third. From 3 200 (demonstration) and 6 400
+#: (factor of 100) on they no longer change; with a factor of 1 000 they are certain to 1e-3 only.
+BOUNCES_OF_ROWS = 25_600
+
+#: Rows of which the kernels' lines are held at a time.
+PART = 4096
+#: Displacement, radius, impact velocity and impacts of a building.
+MAXIMA = 4
+
+
+class RowMaxima(NamedTuple):
+    """
+    Largest responses of each building of the rows, and the impacts of each interface.
+
+    Attributes
+    ----------
+    radius : (n_buildings,) ndarray
+        Largest radius ``sqrt(D² + (D' / w)²)`` of the modal coordinate in the row, exact between
+        samples, m.
+    free_radius : (n_buildings,) ndarray
+        Largest radius of the building alone, without contact, m.
+    displacement : (n_buildings,) ndarray
+        Largest ``|D|`` in the row, exact between samples, m.
+    impacts : (n_buildings,) ndarray of int
+        Number of impacts between the building and the next one of its row that are faster than 1
+        mm/s and than 1 % of the fastest of this interface; 0 for the last building of a row.
+    impact_velocity : (n_buildings,) ndarray
+        Largest approach speed at the contact height of this interface, m/s; 0 without impact.
+    """
+
+    radius: FloatArray
+    free_radius: FloatArray
+    displacement: FloatArray
+    impacts: NDArray[np.int64]
+    impact_velocity: FloatArray
+
+
+def row_maxima(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    rows: BuildingRows,
+    *,
+    free_vibration: bool = True,
+) -> RowMaxima:
+    """
+    Compute the maxima of the exact pounding histories of rows of buildings.
+
+    The physics is that of `pounding_history`, with a separate contact height for every interface:
+    an impulse ``J`` at the interface after building k changes its modal velocity by ``-a J / m``
+    and that of its neighbour by ``b J / m``, with the participations ``a`` (right) and ``b``
+    (left). Bouncing ends in contact when a bounce would last less than a thousandth of a sampling
+    interval, or after 25 600 impacts per interface in one step. The result of a row does not depend
+    on the other rows, nor on the number of threads.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) array_like
+        Components of the ground acceleration, m/s².
+    dt : float
+        Sampling interval, s.
+    rows : BuildingRows
+        Rows of one building or more each.
+    free_vibration : bool
+        As in `pounding_history`.
+
+    Returns
+    -------
+    RowMaxima
+        One entry per building, in the order of the rows.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+    RuntimeError
+        If a step has more events than any record causes.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
+    (8).
+    """
+    maxima, _ = _maxima(north, east, dt, rows, free_vibration, with_pairs=False)
+    return maxima
+
+
+def row_and_pair_maxima(
+    north: ArrayLike, east: ArrayLike, dt: float, rows: BuildingRows
+) -> tuple[RowMaxima, RowMaxima]:
+    """
+    Compute `row_maxima` and those of every two neighbours without the others of their row.
+
+    Two neighbours that meet no other one in their row are computed once for both.
+
+    Parameters
+    ----------
+    north, east, dt, rows
+        As in `row_maxima`; free vibration is followed.
+
+    Returns
+    -------
+    rows, pairs : RowMaxima
+        One entry per building; the pairs have one line per building, ``(n_buildings, 2)``, of it
+        and the next one, without meaning for the last of each row.
+
+    Raises
+    ------
+    ValueError, RuntimeError
+        As `row_maxima`.
+    """
+    return _maxima(north, east, dt, rows, free_vibration=True, with_pairs=True)
+
+
+def _maxima(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    rows: BuildingRows,
+    free_vibration: bool,
+    with_pairs: bool,
+) -> tuple[RowMaxima, RowMaxima]:
+    """Return the maxima of rows and of pairs alone, where these are computed."""
+    # Check every argument; the ground comes to rest before free vibration
+    step = checks.number("dt", dt, checks.positive)
+    checked = checked_rows(rows)
+    ground = np.stack([checks.record("north", north), checks.record("east", east)])
+    if free_vibration:
+        ground = closed_record(ground)
+
+    # Every building alone, then every part of a row whose gaps may close
+    maxima = np.zeros((checked.period.size, MAXIMA))
+    maxima[:, :2] = _alone(ground, step, checked, free_vibration)
+    free = maxima[:, 1].copy()
+    next_free = np.stack([free, np.append(free[1:], 0.0)], axis=1)
+
+    def run(parts: BuildingRows) -> FloatArray:
+        """Return the maxima of some parts as rows."""
+        return _run(ground, step, parts, free_vibration)
+
+    pairs = run_in_parts(checked, maxima, run, with_pairs)
+    return _named(maxima, free), _named(pairs, next_free)
+
+
+def _named(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
+    """Return maxima by their names."""
+    displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
+    return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
+
+
+def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool) -> FloatArray:
+    """Return the largest displacement and radius of every building alone, (n_buildings, 2)."""
+    # Elastic ones from the record directly, with the free vibration after it
+    azimuth = np.repeat(rows.azimuth, np.diff(rows.first))
+    found = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
+    maxima = np.stack([found.sd, found.per], axis=1)
+    # Others are rows of one building
+    followed = np.isfinite(rows.yield_displacement) | (not free_vibration)
+    if followed.any():
+        every = np.ones(followed.size, dtype=bool)
+        alone = parts_of(rows, every, followed)
+        maxima[followed] = _run(ground, dt, alone, free_vibration)[:, :2]
+    return maxima
+
+
+def _run(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool) -> FloatArray:
+    """Return the maxima of rows, some rows at a time."""
+    maxima = np.empty((rows.period.size, MAXIMA))
+    # The lines of the kernels take 900 bytes per building
+    for begin in range(0, rows.azimuth.size, PART):
+        end = min(begin + PART, rows.azimuth.size)
+        place = slice(rows.first[begin], rows.first[end])
+        fields = {name: getattr(rows, name)[place] for name in BUILDING_FIELDS}
+        # Rows of this part, counted from its first building
+        first = rows.first[begin : end + 1] - rows.first[begin]
+        part = BuildingRows(first, **fields, azimuth=rows.azimuth[begin:end])
+        maxima[place] = _run_part(ground, dt, part, free_vibration)
+    return maxima
+
+
+def _run_part(
+    ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
+) -> FloatArray:
+    """Return the maxima of some rows."""
+    scales = row_scales(rows)
+    lines, counts = _lines_at_end(ground, dt, rows, scales, free_vibration)
+    # The lines hold squares of the largest radii
+    displacement = lines[:, columns.LARGEST_DISPLACEMENT] / scales.displacement
+    radius = np.sqrt(lines[:, columns.LARGEST_RADIUS_SQUARED]) / scales.displacement
+    approach = lines[:, columns.APPROACH] / scales.clearance
+    return np.stack([displacement, radius, approach, counts], axis=1)
+
+
+def _lines_at_end(
+    ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the lines of all buildings at the end, and impacts that count."""
+    # Steps per sampling interval, from the shortest period of each row
+    table = building_table(rows, scales)
+    starts = rows.first[:-1]
+    frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
+    parts = np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
+    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    lines = _lines_at_rest(table, rows, scales, velocity, dt / parts)
+
+    # Run the record and, where it is asked for, the free vibration after it
+    longest = np.maximum.reduceat(rows.period, starts)
+    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
+    steps = parts, free * free_vibration
+    azimuth = np.radians(rows.azimuth)
+    counts = run_row_blocks(ground, dt, rows.first, lines, *steps, azimuth, scales.clearance)
+    return lines, counts
+
+
+def _lines_at_rest(
+    table: FloatArray,
+    rows: BuildingRows,
+    scales: RowScales,
+    ground_velocity: float,
+    duration: FloatArray,
+) -> FloatArray:
+    """Return the kernels' lines of all buildings; ``duration`` is that of a step of each row."""
+    # The last building of a row has no neighbour on its right: its gap is 1
+    lines = np.zeros((len(table), columns.ROW_COLUMNS))
+    lines[:, :6] = table
+    lines[:, columns.GAP] = scales.clearance * rows.gap
+    lines[:, columns.RESTITUTION] = rows.restitution
+    lines[:, COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
+    lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
+
+    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
+    starts, sizes = rows.first[:-1], np.diff(rows.first)
+    largest = np.maximum.reduceat(table[:, 4], starts)
+    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * largest
+    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * duration
+    lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, sizes - 1)
+    return lines

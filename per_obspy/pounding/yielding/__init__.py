@@ -1,1 +1,0 @@
-"""Replace yielding structures by equivalent linear ones."""
