@@ -254,7 +254,7 @@ def _print_ensemble(result: "Result") -> None:
 
 def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") -> None:
     """Print some columns of the worst pairs as a table."""
-    from per_obspy.report.layers.qgis_style import column_aliases
+    from per_obspy.report.layers.qgis import column_aliases
     from per_obspy.screening.columns import known_column
 
     # Probabilities in percent, all else in the unit of its column

@@ -31,14 +31,14 @@ from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.page.document import write_page
-from per_obspy.report.page.export_columns import MOST_COLUMNS
 from per_obspy.report.page.first_screen import revision_line
-from per_obspy.report.page.tally import PAGE_PAIRS
+from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.page.texts import LANGUAGES
 from per_obspy.report.pair_figure import draw_record_to_pair
 from per_obspy.report.results import Event, Region, Results
 from per_obspy.report.summary.statements import event_sentences, station_sentences
 from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.tally import PAGE_PAIRS
 from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
 from per_obspy.tables.coverage import Coverage

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import Language
+from per_obspy.report.tally import PairTally
 from per_obspy.tables.coverage import Coverage
 
 

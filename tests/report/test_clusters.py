@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.report.clusters import SMALLEST, clusters, frame_of
+from per_obspy.report.overview import SMALLEST, clusters, frame_of
 
 
 def test_towns_are_separate_and_in_the_order_of_their_worst_pair():

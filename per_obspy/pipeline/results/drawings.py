@@ -14,8 +14,7 @@ from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.run_facts import read_stations
 from per_obspy.pipeline.screening import shakemap_files
 from per_obspy.pipeline.stations import file_stem
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
-from per_obspy.report.page.drawn_stations import drawn_station
+from per_obspy.report.page.drawings import HISTORY_COLUMNS, drawn_history, drawn_station
 from per_obspy.report.results import Drawings
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.sensitivity import input_sensitivity

@@ -23,16 +23,15 @@ from per_obspy.report.layers.kml import write_kml
 from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
-from per_obspy.report.page.building_outlines import read_outlines
-from per_obspy.report.page.coast import lines_around
-from per_obspy.report.page.content import MOST_ROWS, REJECTED_COLUMNS
-from per_obspy.report.page.export_columns import MOST_COLUMNS
-from per_obspy.report.page.tally import COUNTED, PAGE_PAIRS, PairTally
+from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
+from per_obspy.report.page.map_lines import lines_around, read_outlines
+from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.results import Results
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
 from per_obspy.screening.columns import column_table, known_column
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.tables.ranked.ranked_files import table_name

@@ -13,7 +13,7 @@ from per_obspy.inventory.suspicions import ROW_SUSPICIONS
 from per_obspy.pipeline.results.drawings import HISTORIES, pair_histories, station_rows
 from per_obspy.pipeline.results.report_files import outlines_beside
 from per_obspy.pipeline.stations import stations_of_earlier_run
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS
+from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
 from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.ranked.ranked_table import ROWS

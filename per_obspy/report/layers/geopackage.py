@@ -1,21 +1,97 @@
-"""Layers of a GeoPackage, each with its style for QGIS."""
+"""Layers of a GeoPackage, and GeoParquet with the same pairs."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import TracebackType
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pyogrio
 import shapely
+from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import printable
-from per_obspy.report.layers.shapes import Shapes
+from per_obspy.report.layers.kml import BOTH_PLACES, has_both_places
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Shapes = NDArray[np.object_]
+
+
+def pair_shapes(table: pd.DataFrame) -> Shapes:
+    """
+    Return each pair as a line from building 1 to 2, or as a point where only its middle is known.
+
+    Lines across the date line go on beyond 180 degrees, instead of around the Earth.
+    """
+    if not has_both_places(table.columns):
+        return points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
+    east_1, north_1, east_2, north_2 = (table[name].to_numpy(float) for name in BOTH_PLACES)
+    # Beyond the date line
+    east_2 = east_2 - 360.0 * np.round((east_2 - east_1) / 360.0)
+    ends = np.stack([np.column_stack([east_1, north_1]), np.column_stack([east_2, north_2])], 1)
+    lines: Shapes = shapely.linestrings(ends)
+    return lines
+
+
+def points(longitude: FloatArray, latitude: FloatArray) -> Shapes:
+    """Return points; None where a coordinate is unknown."""
+    known = np.isfinite(longitude) & np.isfinite(latitude)
+    shapes: Shapes = shapely.points(longitude, latitude)
+    shapes[~known] = None
+    return shapes
+
+
+#: Version of the specification (https://geoparquet.org/releases/v1.1.0), and name of the shapes.
+VERSION, GEOMETRY = "1.1.0", "geometry"
+
+
+class GeoParquet:
+    """
+    GeoParquet file to which rows are appended in pieces.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._writer: pq.ParquetWriter | None = None
+
+    def append(self, table: pd.DataFrame, shapes: Shapes) -> None:
+        """Append rows; those of the first piece decide the types of all columns."""
+        rows = with_shapes(table, shapes, GEOMETRY)
+        if self._writer is None:
+            # Without a reference system coordinates are longitude and latitude, WGS 84
+            column = {"encoding": "WKB", "geometry_types": _types(shapes)}
+            geo = {"version": VERSION, "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+            schema = rows.schema.with_metadata({"geo": json.dumps(geo)})
+            self._writer = pq.ParquetWriter(self.path, schema)
+        self._writer.write_table(rows.cast(self._writer.schema))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._writer is not None:
+            self._writer.close()
+
+
+def _types(shapes: Shapes) -> list[str]:
+    """Return the types of the shapes; none means that they are unknown."""
+    return [geometry_type(shapes)] if shapely.is_geometry(shapes).any() else []
+
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
 CRS = "EPSG:4326"

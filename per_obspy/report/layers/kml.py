@@ -1,6 +1,6 @@
 """Worst pairs as KML, for globe viewers and telephones."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -9,9 +9,17 @@ import pandas as pd
 
 from per_obspy.errors import printable, shortened
 from per_obspy.files import written_whole
-from per_obspy.report.layers.pair_places import has_both_places
 from per_obspy.report.style import class_colours
 from per_obspy.report.words import name_text, pair_lines
+
+#: Longitude and latitude of both buildings.
+BOTH_PLACES = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
+
+
+def has_both_places(columns: Iterable[str]) -> bool:
+    """Return whether a table has the places of both buildings."""
+    return set(BOTH_PLACES) <= set(columns)
+
 
 #: Namespace of KML 2.2 (OGC 07-147r2).
 NAMESPACE = "http://www.opengis.net/kml/2.2"

@@ -1,15 +1,292 @@
-"""Page as one HTML file with its style, script and data."""
+"""Page as one HTML file: content as JSON values and packed tables, with its style and script."""
 
 import hashlib
+import math
 import re
 from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
+
+from per_obspy.errors import shortened
 from per_obspy.files import written_whole
-from per_obspy.report.page.content import page_content
-from per_obspy.report.page.packing import encoded
+from per_obspy.report.coverage import coverage_number, coverage_sentences
+from per_obspy.report.page.first_screen import first_screen
+from per_obspy.report.page.packing import (
+    FRACTION_BITS,
+    LONGEST_TEXT,
+    PackedTable,
+    addresses,
+    encoded,
+    pack_export,
+    pack_table,
+    text_kind,
+)
+from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases, written
 from per_obspy.report.results import Results
+from per_obspy.report.style import BUILDING_COLOURS, class_colours
+from per_obspy.report.tally import PairTally
+from per_obspy.report.words import missing_gap, prevention_kind
+from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.ranking import EVERY_STATE
+
+#: Columns of a pair on the page, and their kinds.
+PAIR_KINDS = {
+    "rank": "whole", "pair_id": "text", "state": "choice", "risk_class": "choice",
+    "probability": "number", "expected_impact_velocity": "number", "impact_velocity_84": "number",
+    "expected_amplification": "number", "gap": "number", "demand": "number",
+    "demand_rule": "choice", "missing_gap": "number", "impacts": "number",
+    "impact_velocity_exact": "number", "amplification_exact_1": "number",
+    "amplification_exact_2": "number", "flags": "names", "derived": "names", "area": "choice",
+    "station": "choice", "distance": "number", "azimuth_used": "number",
+    "building_id_1": "text", "building_id_2": "text", "longitude": "place", "latitude": "place",
+    "longitude_1": "place", "latitude_1": "place", "longitude_2": "place", "latitude_2": "place",
+    "height_1": "number", "height_2": "number", "storeys_1": "number", "storeys_2": "number",
+    "period_1": "number", "period_2": "number", "damping_1": "number", "damping_2": "number",
+    "participation_1": "number", "participation_2": "number", "per_1": "number",
+    "per_2": "number", "sd_1": "number", "sd_2": "number", "period_log_std_1": "number",
+    "period_log_std_2": "number", "supplemental_damping": "number",
+    "bumper_restitution": "number", "prevention_kind": "choice", "worst_scenario": "choice",
+}  # fmt: skip
+
+#: Largest and smallest probability below 1 and above 0 that single precision keeps apart from them.
+NEARLY_NEVER, NEARLY_SURE = 1e-30, 1.0 - 2.0**-FRACTION_BITS
+
+#: Kinds of texts that the script never shows by their keys.
+HIDDEN = ("flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_")
+
+#: Columns of a building on the page, and their kinds.
+BUILDING_KINDS = {
+    "rank": "number", "building_id": "text", "probability_common": "number",
+    "neighbours": "number", "neighbours_that_can_hit": "number", "impacts": "number",
+    "impact_velocity": "number", "position": "choice", "prevention": "choice",
+}  # fmt: skip
+
+#: Columns of the tables further down.
+STATION_COLUMNS = (
+    "station", "state", "pairs", "pga", "pgv", "per", "sd", "shortest_usable_period",
+    "longest_usable_period", "warnings",
+)  # fmt: skip
+AREA_COLUMNS = (
+    "area", "pairs", "yes", "likely", "possible", "expected_pounding", "worst_pair",
+    "worst_expected_impact_velocity",
+)  # fmt: skip
+REJECTED_COLUMNS = ("kind", "name", "source", "row", "reasons")
+
+#: Rows of the tables further down.
+MOST_ROWS = 500
+
+#: Longest text of a cell in them, characters.
+LONGEST_CELL = 300
+
+
+def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
+    """Return the content of the page, with descriptions of its tables, and the tables."""
+    # Sentences first, then whatever the script draws
+    screen = first_screen(results)
+    # What has a verdict, of all that should have one, is the first number
+    whole = partial(written, digits=0, language=results.language)
+    screen.numbers.insert(0, coverage_number(results.coverage, results.language, whole))
+    texts, tables = LANGUAGES[results.language], _tables(results)
+    content = {
+        "language": results.language,
+        "texts": _texts(texts, results.stem),
+        "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
+        "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
+        "title": shortened(results.region.title, LONGEST_CELL),
+        "simulated": results.region.simulated,
+        "coverage": coverage_sentences(results.coverage, results.language),
+        "warns": results.coverage.lacks_many,
+        **screen._asdict(),
+        "states": _states(results.tally, texts),
+        "classes": _classes(results, texts),
+        "pair_count": results.tally.pairs,
+        **_drawn(results),
+        **_further_tables(results, texts),
+        "tables": [table.description for table in tables],
+    }
+    return content, tables
+
+
+def _texts(texts: Mapping[str, str], stem: str) -> dict[str, str]:
+    """Return the texts of the script; those of this kind of results replace the general ones."""
+    shown = {key: text for key, text in texts.items() if not key.startswith(HIDDEN)}
+    ending = f"_{stem}"
+    own = {key.removesuffix(ending): shown[key] for key in shown if key.endswith(ending)}
+    return shown | own
+
+
+def _drawn(results: Results) -> dict[str, Any]:
+    """Return the data of map and figures that are not in tables."""
+    drawings = results.drawings
+    return {
+        "building_colours": BUILDING_COLOURS,
+        "cell_size": results.tally.cells.size,
+        "epicentre": list(results.event.place[:2]) if results.event.place else None,
+        **results.lines,
+        # Names as they are packed, by which the script finds the pairs of an outline
+        "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in results.outlines],
+        "histories": {str(rank): history for rank, history in drawings.histories.items()},
+        "history_count": len(drawings.histories),
+        "station_drawings": {
+            shortened(name, LONGEST_TEXT): station for name, station in drawings.stations.items()
+        },
+        "sensitivity": {str(rank): rows for rank, rows in drawings.sensitivity.items()},
+        "sensitivity_counts": [drawings.worst, drawings.doubtful],
+    }
+
+
+def _tables(results: Results) -> list[PackedTable]:
+    """Return pairs, cells, buildings, and the columns of pairs that only the export needs."""
+    cells = results.tally.cells.table()
+    kinds = dict.fromkeys(("longitude", "latitude"), "place")
+    kinds |= {str(name): "whole" for name in cells if name not in kinds}
+    # Places of the inventory by name, for the search
+    address, pairs = addresses(results.worst), _with_measures(results.worst)
+    if address is not None:
+        pairs = pairs.assign(address=address)
+    return [
+        pack_table(pairs, PAIR_KINDS | {"address": text_kind(pairs, "address")}),
+        pack_table(cells, kinds),
+        pack_table(_buildings(results), BUILDING_KINDS),
+        pack_export(results.worst, PAIR_KINDS),
+    ]
+
+
+def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
+    """Return pairs with the case of their measures, and probabilities that stay below 1."""
+    names = ("gap", "demand", "missing_gap", "state", "risk_class")
+    known = worst[[name for name in names if name in worst]].to_dict("records")
+    pairs = worst.assign(prevention_kind=[prevention_kind(pair) for pair in known])
+    if "demand" in worst:
+        pairs = pairs.assign(missing_gap=[missing_gap(pair) for pair in known])
+    if "probability" not in pairs:
+        return pairs
+    # Neither 0 nor 1 may come of the packing
+    chance = pairs["probability"]
+    open_chance = (chance > 0.0) & (chance < 1.0)
+    kept = chance.clip(NEARLY_NEVER, NEARLY_SURE).where(open_chance, chance)
+    return pairs.assign(probability=kept)
+
+
+def _buildings(results: Results) -> pd.DataFrame:
+    """Return the buildings with their prevention in the language of the page."""
+    worst = results.buildings
+    if "prevention" not in worst:
+        return worst
+    sentences = [fixed_phrases(str(text), results.language) for text in worst["prevention"]]
+    return worst.assign(prevention=sentences)
+
+
+def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the states, the likeliest first, with label and number of pairs."""
+    return [
+        {"name": name, "label": texts[f"state_{name}"], "count": tally.states[name]}
+        for name in EVERY_STATE
+    ]
+
+
+def _classes(results: Results, texts: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the classes, the worst first, with colour, weight of the mark and number of pairs."""
+    # The worst is the first
+    colours = class_colours(results.region.classes)
+    return [
+        {
+            "name": name,
+            "label": texts.get(f"class_{name}", shortened(name, 40)),
+            "colour": colour,
+            "weight": 4.0 * max(1.0 - number / max(len(colours) - 2, 1), 0.0),
+            "count": results.tally.classes[name],
+        }
+        for number, (name, colour) in enumerate(colours.items())
+    ]
+
+
+def _further_tables(results: Results, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return stations, areas, rejections and provenance."""
+    areas, note = results.areas, texts["rejected_none"]
+    if "expected_pounding" in areas:
+        areas = areas.sort_values("expected_pounding", ascending=False)
+    if results.rejections:
+        shown = min(results.rejections, MOST_ROWS)
+        key = "rejected_some_one" if results.rejections == 1 else "rejected_some"
+        note = texts[key].format(shown=shown, all=results.rejections)
+    elif results.coverage.pairs > results.coverage.screened:
+        # What the search for pairs left out is in no table of this run
+        note = " ".join(coverage_sentences(results.coverage, results.language))
+    # Stations are on the map too
+    stations = _rows(_described(results.stations, results.language), STATION_COLUMNS, texts)
+    return {
+        "stations": {**stations, "places": _station_places(results.stations)},
+        "areas": _rows(areas, AREA_COLUMNS, texts),
+        "rejected": {**_rows(_reasons(results, texts), REJECTED_COLUMNS, texts), "note": note},
+        "provenance": [
+            [name, shortened(value, LONGEST_CELL)] for name, value in results.provenance
+        ],
+    }
+
+
+def _reasons(results: Results, texts: Mapping[str, str]) -> pd.DataFrame:
+    """Return the rejections with kinds and reasons in the language of the page."""
+    if not {"kind", "reasons"} <= set(results.rejected):
+        return results.rejected
+    kinds = [texts.get(f"kind_{kind}", str(kind)) for kind in results.rejected["kind"]]
+    reasons = [fixed_phrases(str(text), results.language) for text in results.rejected["reasons"]]
+    return results.rejected.assign(kind=kinds, reasons=reasons)
+
+
+def _described(stations: pd.DataFrame, language: Language) -> pd.DataFrame:
+    """Return stations with their states in words, and reasons of rejection with the warnings."""
+    texts = LANGUAGES[language]
+    if not {"state", "warnings", "rejected"} <= set(stations):
+        return stations
+    # Reasons and warnings are one column
+    named = {name: texts[f"station_{name}"] for name in ("used", "rejected")}
+    both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
+    state = stations["state"].map(named).fillna("")
+    sentences = [fixed_phrases(text, language) for text in both.str.strip()]
+    return stations.assign(state=state, warnings=sentences)
+
+
+def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
+    """Return name, longitude, latitude of every station with a place, and whether it is used."""
+    if not {"longitude", "latitude"} <= set(stations):
+        return []
+    placed = stations[stations["longitude"].notna() & stations["latitude"].notna()]
+    return [
+        [
+            shortened(str(row["station"]), 24),
+            float(row["longitude"]),
+            float(row["latitude"]),
+            row["state"] == "used",
+        ]
+        for _, row in placed.iterrows()
+    ]
+
+
+def _rows(table: pd.DataFrame, columns: Sequence[str], texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return headings and rows for the columns that a table has."""
+    present = [name for name in columns if name in table]
+    rows = [
+        [_cell(value) for value in row]
+        for row in table[present].head(MOST_ROWS).itertuples(index=False)
+    ]
+    return {"heads": [texts[f"head_{name}"] for name in present], "rows": rows}
+
+
+def _cell(value: Any) -> str | float:
+    """Return a value of a table for JSON; missing values are empty texts."""
+    if value is None or value is pd.NA:
+        return ""
+    if isinstance(value, str):
+        return shortened(value, LONGEST_CELL)
+    number = float(value)
+    return number if math.isfinite(number) else ""
+
 
 #: Parts of the script, in their order.
 SCRIPTS = ("data.js", "map.js", "list.js", "details.js", "stations.js", "page.js")

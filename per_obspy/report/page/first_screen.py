@@ -7,9 +7,9 @@ from typing import NamedTuple
 import pandas as pd
 
 from per_obspy.errors import shortened
-from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language, counted, fixed_phrases, written
 from per_obspy.report.results import Event, Results
+from per_obspy.report.tally import PairTally
 
 #: Names in a sentence.
 NAMED = 5

@@ -2,7 +2,7 @@
 The page of a run, from its results.
 
 Tests of per_obspy.pipeline.report, per_obspy.pipeline.results.drawings and
-per_obspy.report.page.drawn_histories.
+per_obspy.report.page.drawings.
 """
 
 import json

@@ -1,9 +1,9 @@
 """
 Layers read back by GDAL and by SQLite, which shares no code with the writers.
 
-Tests of per_obspy.report.layers.geopackage, per_obspy.report.layers.geoparquet,
-per_obspy.report.layers.building_layer, per_obspy.report.layers.qgis_project and
-per_obspy.report.layers.shapes and per_obspy.report.layers.pair_places too:
+Tests of per_obspy.report.layers.geopackage, per_obspy.report.layers.geopackage,
+per_obspy.report.layers.map_layers, per_obspy.report.layers.qgis and
+per_obspy.report.layers.geopackage and per_obspy.report.layers.kml too:
 ``write_layers`` calls them.
 """
 

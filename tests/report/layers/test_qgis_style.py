@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from per_obspy.report.layers.qgis_style import class_style, single_style
+from per_obspy.report.layers.qgis import class_style, single_style
 
 CLASSES = ("severe", "high", "low")
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.results import Drawings, Event, Region, Results
+from per_obspy.report.tally import PAGE_PAIRS, PairTally
 from per_obspy.tables.coverage import Coverage
 
 CLASSES = ("severe", "high", "moderate", "low")

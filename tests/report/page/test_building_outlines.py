@@ -4,7 +4,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from per_obspy.report.page.building_outlines import MOST_CORNERS, read_outlines
+from per_obspy.report.page.map_lines import MOST_RING_CORNERS, read_outlines
 
 shapely = pytest.importorskip("shapely")
 
@@ -37,7 +37,7 @@ def test_an_outline_of_many_corners_is_simplified(tmp_path):
     circle = shapely.Point(13.0, 43.0).buffer(0.001, quad_segs=500)
     file = write(tmp_path / "b.parquet", [shapely.to_wkb(circle)])
     ((_, corners),) = read_outlines(file, ["1"])
-    assert 8 < len(corners) // 2 <= MOST_CORNERS
+    assert 8 < len(corners) // 2 <= MOST_RING_CORNERS
 
 
 @pytest.mark.parametrize("shape", [None, b"", b"not a shape", shapely.to_wkb(shapely.Polygon())])

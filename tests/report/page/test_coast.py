@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.report.page.coast import MOST_CORNERS, lines_around
+from per_obspy.report.page.map_lines import MOST_CORNERS, lines_around
 
 
 def distance(lines, longitude, latitude):

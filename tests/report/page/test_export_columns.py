@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from per_obspy.report.page import export_columns
-from per_obspy.report.page.export_columns import addresses, pack_export
+from per_obspy.report.page import packing
+from per_obspy.report.page.packing import addresses, pack_export
 
 
 def described(packed):
@@ -31,7 +31,7 @@ def test_kinds_lose_no_digit_of_an_identifier():
 
 
 def test_columns_without_room_are_named(monkeypatch):
-    monkeypatch.setattr(export_columns, "MOST_BYTES", 1_500)
+    monkeypatch.setattr(packing, "MOST_BYTES", 1_500)
     random = np.random.default_rng(1)
     table = pd.DataFrame({"a": random.random(500), "b": random.random(500), "c": 1.0})
     packed = pack_export(table, [])
@@ -41,7 +41,7 @@ def test_columns_without_room_are_named(monkeypatch):
 
 
 def test_a_wide_table_does_not_make_a_large_page(monkeypatch):
-    monkeypatch.setattr(export_columns, "MOST_COLUMNS", 5)
+    monkeypatch.setattr(packing, "MOST_COLUMNS", 5)
     table = pd.DataFrame({f"x{number}": [number] for number in range(9)})
     assert pack_export(table, []).description["left_out"] == ["x5", "x6", "x7", "x8"]
 

@@ -1,7 +1,7 @@
 """
 The page as a person uses it, in Chromium; its script and style are package data.
 
-Its content comes from per_obspy.report.page.document, per_obspy.report.page.content and
+Its content comes from per_obspy.report.page.document, per_obspy.report.page.document and
 per_obspy.report.page.first_screen.
 """
 
@@ -397,7 +397,7 @@ def test_tab_walks_through_the_page_from_top_to_bottom(opened):
 
 
 def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkeypatch):
-    monkeypatch.setattr("per_obspy.report.page.tally.PAGE_PAIRS", 4)
+    monkeypatch.setattr("per_obspy.report.tally.PAGE_PAIRS", 4)
     table = pair_table(40)
     data = page_data(table)
     page = opened(replace(data, worst=table.head(4)))

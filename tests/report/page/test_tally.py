@@ -1,10 +1,9 @@
-"""Counts in pieces: per_obspy.report.page.tally and per_obspy.report.page.cells."""
+"""Counts in pieces: per_obspy.report.tally and per_obspy.report.tally."""
 
 import numpy as np
 import pandas as pd
 
-from per_obspy.report.page.cells import MOST_CELLS, SMALLEST_CELL, CellCounts
-from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.tally import MOST_CELLS, PAGE_PAIRS, SMALLEST_CELL, CellCounts, PairTally
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 

@@ -14,12 +14,12 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from per_obspy.report.page.tally import PairTally
 from per_obspy.report.results import Region, Results
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
 from per_obspy.report.summary.statements import event_sentences
 from per_obspy.report.summary.wording import ENGLISH, SPANISH
+from per_obspy.report.tally import PairTally
 from per_obspy.tables.coverage import Coverage, Search
 
 COVERAGE = Coverage(20, 16, {"no station within reach": 4})

@@ -1,10 +1,15 @@
-"""Coast lines and borders around a region, from Natural Earth 1:10 million (public domain)."""
+"""Lines of the map of the page: coasts and borders, and the outlines of buildings."""
 
+from collections.abc import Collection
 from functools import cache
 from importlib.resources import as_file, files
-from typing import NamedTuple
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
@@ -104,3 +109,62 @@ def _world() -> _Lines:
         sums = np.cumsum(stored["steps"].astype(np.int64), axis=0)
         first = np.repeat(stored["starts"] - sums[starts], stored["lengths"], axis=0)
         return _Lines((sums + first) * float(stored["unit"]), ends, stored["is_border"])
+
+
+#: Outlines on the page, and corners of each, at most.
+MOST_OUTLINES = 8_000
+MOST_RING_CORNERS = 60
+
+#: Decimals of degrees: 0.1 m.
+RING_DECIMALS = 6
+
+
+def read_outlines(path: Path, names: Collection[str]) -> list[tuple[str, list[float]]]:
+    """
+    Read the outlines of buildings; empty without the table or the library that reads it.
+
+    Parameters
+    ----------
+    path : Path
+        GeoParquet with ``building_id`` and ``geometry`` in degrees.
+    names : collection of str
+        Buildings that are wanted, the most important first.
+
+    Returns
+    -------
+    list of (str, list of float)
+        Name, and longitude and latitude of the corners by turns.
+    """
+    if not path.is_file() or find_spec("shapely") is None:
+        return []
+    # The first names are of the worst pairs
+    wanted = set(list(names)[:MOST_OUTLINES])
+    outlines = list[tuple[str, list[float]]]()
+    with pq.ParquetFile(path, pre_buffer=False) as file:
+        if not {"building_id", "geometry"} <= set(file.schema_arrow.names):
+            return []
+        for batch in file.iter_batches(10_000, columns=["building_id", "geometry"]):
+            # Names of buildings may be stored as numbers
+            texts = pc.cast(batch["building_id"], "string").to_pylist()
+            chosen = [(name, row) for row, name in enumerate(texts) if name in wanted]
+            shapes = batch["geometry"]
+            outlines += [(name, _corners(shapes[row].as_py())) for name, row in chosen]
+    return [(name, corners) for name, corners in outlines if corners]
+
+
+def _corners(shape: bytes | None) -> list[float]:
+    """Return the corners of the largest polygon of a shape, none if it has no finite outline."""
+    import shapely
+
+    geometry: Any = shapely.from_wkb(shape, on_invalid="ignore") if shape else None
+    if geometry is None or geometry.is_empty:
+        return []
+    polygon = max(shapely.get_parts(geometry), key=shapely.area)
+    tolerance = 0.0
+    corners = shapely.get_coordinates(shapely.get_exterior_ring(polygon))
+    while len(corners) > MOST_RING_CORNERS:
+        # Double the distance by which the outline may be off until it is simple
+        tolerance = max(2.0 * tolerance, 1e-6)
+        corners = shapely.get_coordinates(shapely.simplify(polygon, tolerance))
+    flat = np.round(corners, RING_DECIMALS).ravel()
+    return flat.tolist() if np.isfinite(flat).all() else []

@@ -1,4 +1,4 @@
-"""Pounding histories of single pairs, thinned for a drawing."""
+"""Histories of pairs, and records and spectra of stations, thinned for a drawing of the page."""
 
 import math
 from typing import Any
@@ -8,11 +8,13 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.pounding.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
 from per_obspy.report.pair_figure import motion_along
+from per_obspy.screening.values import components
 
-#: Intervals of time in a drawing, each with the smallest and the largest displacement in it.
+#: Intervals of time in a drawing, each with the smallest and the largest value in it.
 INTERVALS = 300
 
 #: Impacts that are drawn, the fastest ones.
@@ -90,8 +92,8 @@ def _thinned(history: PoundingHistory) -> dict[str, Any]:
     edges = np.unique(np.linspace(first, max(last, first + 1), INTERVALS + 1).astype(int))
     return {
         "time": [round(float(time), 3) for time in history.time[edges]],
-        "one": _envelope(history.displacement[0], edges),
-        "two": _envelope(history.displacement[1], edges),
+        "one": _displacements(history.displacement[0], edges),
+        "two": _displacements(history.displacement[1], edges),
         "impacts": _fastest(history.impacts),
     }
 
@@ -106,11 +108,83 @@ def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
     return fastest.round(3).to_numpy().tolist()
 
 
-def _envelope(displacement: FloatArray, edges: Any) -> list[float]:
+def _displacements(displacement: FloatArray, edges: Any) -> list[float]:
     """Return the smallest and the largest displacement between edges, mm."""
-    values = 1000.0 * displacement[: edges[-1] + 1]
+    envelope = _envelope(1000.0 * displacement[: edges[-1] + 1], edges)
+    return [round(float(value), 1) for value in envelope]
+
+
+def _envelope(values: FloatArray, edges: Any) -> FloatArray:
+    """Return the smallest and the largest value between edges by turns."""
     smallest = np.minimum.reduceat(values, edges[:-1])
     largest = np.maximum.reduceat(values, edges[:-1])
-    return [
-        round(float(value), 1) for pair in zip(smallest, largest, strict=True) for value in pair
-    ]
+    return np.stack([smallest, largest], axis=1).ravel()
+
+
+#: Digits of the numbers.
+DIGITS = 3
+
+#: Share of the energy of a record before and after its drawn part.
+QUIET = 0.001
+
+
+def drawn_station(station: xr.Dataset) -> dict[str, Any]:
+    """
+    Return record and spectra of a station for a drawing.
+
+    Parameters
+    ----------
+    station : Dataset
+        With its processed acceleration.
+
+    Returns
+    -------
+    dict
+        ``start, step`` (s), ``north, east`` (smallest and largest acceleration per interval, m/s²;
+        ``east`` is empty where there is one horizontal), ``period`` (s), ``per, sd`` (cm, of the
+        larger horizontal), ``damping`` and ``usable`` (shortest and longest period, s).
+    """
+    north, east, interval = components(station)
+    edges = _edges(north**2 + east**2)
+    # Spectra of the horizontals, at the damping of all records
+    count = int(station.attrs["horizontals"])
+    near = station.sel(damping=REFERENCE_DAMPING, method="nearest")
+    # Pads at both ends are left out
+    return {
+        "start": _rounded(interval * edges[0]),
+        "step": _rounded(interval * (edges[-1] - edges[0]) / (len(edges) - 1)),
+        "north": _samples(north, edges),
+        "east": _samples(east, edges) if count > 1 else [],
+        "period": _all_rounded(station["period"].to_numpy()),
+        "per": _all_rounded(100.0 * near["per"].to_numpy()[:count].max(axis=0)),
+        "sd": _all_rounded(100.0 * near["sd"].to_numpy()[:count].max(axis=0)),
+        "damping": float(near["damping"]),
+        "usable": [
+            _rounded(float(station[f"{end}_usable_period"])) for end in ("shortest", "longest")
+        ],
+    }
+
+
+def _edges(squared: FloatArray) -> Any:
+    """Return the first samples of the intervals, and the end of the last one."""
+    energy = np.cumsum(squared)
+    # All of a record at rest
+    shares = np.array([QUIET, 1.0 - QUIET]) if energy[-1] > 0.0 else np.array([0.0, 1.0])
+    first, last = np.searchsorted(energy, shares * energy[-1])
+    end = min(max(int(last), int(first) + 1) + 1, squared.size)
+    return np.unique(np.linspace(first, end, INTERVALS + 1).astype(int))
+
+
+def _samples(samples: FloatArray, edges: Any) -> list[float | None]:
+    """Return the smallest and the largest sample between edges."""
+    return _all_rounded(_envelope(samples[: edges[-1]], edges))
+
+
+def _all_rounded(values: FloatArray) -> list[float | None]:
+    """Return numbers with few digits, None where they are not finite."""
+    return [_rounded(float(value)) for value in values]
+
+
+def _rounded(value: float) -> float | None:
+    """Return a number with few digits, None where it is not finite."""
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
