@@ -17,12 +17,12 @@ from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.records.simulation.earthquake import simulate
 from per_obspy.records.simulation.station_metadata import GAIN
 from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
+from per_obspy.screening.ground_motion.field import great_circle, residual_correlation
 from per_obspy.screening.ground_motion.site_motion import (
     Hypocentre,
     RegionalMotion,
     prepared_field,
 )
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle, residual_correlation
 from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.values import both, values
 

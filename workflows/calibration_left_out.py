@@ -18,7 +18,7 @@ from per_obspy.screening.ground_motion.site_motion import (
     prepared_field,
 )
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.site_demand import median_at_site, site_demand
+from per_obspy.screening.uncertainty.motion import median_at_site, site_demand
 from per_obspy.screening.values import values
 
 #: Periods whose pairs are screened, s: shortest, longest, number.

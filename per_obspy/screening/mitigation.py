@@ -18,9 +18,8 @@ from per_obspy.kernels.pairs.added_damping import least_dampings
 from per_obspy.pounding.bumpers import required_restitution
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap, srss_gap
-from per_obspy.screening.by_record.exact_damping import NEEDED, least_exact_damping
-from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
-from per_obspy.screening.by_record.stored_spectra import stored_log
+from per_obspy.screening.by_record.exact import NEEDED, least_exact_damping
+from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth, stored_log
 from per_obspy.screening.by_record.yielding import governing, governing_radii
 from per_obspy.screening.values import Columns, Table, both, chosen, only, values
 

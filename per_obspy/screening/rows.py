@@ -16,17 +16,17 @@ from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.suspicions import ODD
-from per_obspy.screening.by_record.demand import demand_ratio
-from per_obspy.screening.by_record.estimates import demand_columns
+from per_obspy.screening.by_record.estimates import demand_columns, demand_ratio
 from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
-from per_obspy.screening.by_record.pair_radii import (
+from per_obspy.screening.by_record.station_motion import (
     PairMotion,
+    StationMotion,
     motion_along_azimuths,
     motion_along_every_azimuth,
     motion_of_one_horizontal,
+    station_motion,
 )
-from per_obspy.screening.by_record.station_motion import StationMotion, station_motion
-from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback
+from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback
 from per_obspy.screening.codes import code_columns, rule_columns
 from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
 from per_obspy.screening.flags import (

@@ -16,7 +16,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.nodes import (
+from per_obspy.screening.uncertainty.population import (
     LARGEST_DAMPING,
     gap_dispersion,
     median_gap,

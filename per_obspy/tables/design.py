@@ -6,7 +6,7 @@ import pandas as pd
 
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.inventory.suspicions import ODD
-from per_obspy.screening.by_spectrum.design_table import DESIGN
+from per_obspy.screening.by_spectrum.design import DESIGN
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.tables.rounding import rounded_table
@@ -22,7 +22,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     Parameters
     ----------
     table : DataFrame
-        From :func:`per_obspy.screening.by_spectrum.design_table.design_table`.
+        From :func:`per_obspy.screening.by_spectrum.design.design_table`.
     folder : Path
         Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """

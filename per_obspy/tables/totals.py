@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
-from per_obspy.screening.region.outlines import box_outlines, hexagon_outlines, hexagons
 from per_obspy.screening.region.totals import (
     PartialTotals,
+    box_outlines,
     grid_cells,
+    hexagon_outlines,
+    hexagons,
     joined_parts,
     joined_totals,
     partial_totals,

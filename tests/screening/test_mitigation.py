@@ -8,7 +8,7 @@ from scipy.interpolate import RegularGridInterpolator
 from screening_samples import make_station, table_of
 
 import per_obspy
-from per_obspy.screening.by_record.exact_damping import least_exact_damping
+from per_obspy.screening.by_record.exact import least_exact_damping
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS

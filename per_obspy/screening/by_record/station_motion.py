@@ -1,4 +1,10 @@
-"""Ground motion of one station as arrays: its record and its stored spectra."""
+"""
+Motion of a station: its record, its stored spectra, and the radii of pairs read from them.
+
+Every array of radii has the shape (n_pairs, n_azimuths): one azimuth where the pair's is known or
+the station has a single horizontal, else every degree of the half circle, from which the pair's
+worst is chosen by its demand. Both buildings are always driven along the same azimuth.
+"""
 
 from typing import NamedTuple
 
@@ -7,8 +13,89 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.screening.by_record.stored_spectra import SMALLEST_DAMPING, LogSpectra
-from per_obspy.screening.values import Table, components, number, values
+from per_obspy.pounding.correlation import directional_correlation
+from per_obspy.screening.values import Table, both, components, number, values
+from per_obspy.spectra.azimuthal import (
+    EVERY_AZIMUTH,
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+)
+from per_obspy.spectra.per_pair import azimuth_maxima
+
+#: Dampings are compared on a logarithmic scale; below this one they count as it.
+SMALLEST_DAMPING = 1e-3
+
+
+class LogSpectra(NamedTuple):
+    """
+    Stored spectra on logarithmic axes.
+
+    Attributes
+    ----------
+    periods, dampings : (n_periods,), (n_dampings,) ndarray
+        Logarithms of periods in s and of dampings as fractions of critical.
+    radii : (n_azimuths, n_dampings, n_periods) ndarray
+        Logarithms of PER or SD in m.
+    """
+
+    periods: FloatArray
+    dampings: FloatArray
+    radii: FloatArray
+
+
+def log_oscillator(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+    """Return ln period and ln damping of building i."""
+    return log_period_and_damping(values(table, f"period_{i}"), values(table, f"damping_{i}"))
+
+
+def log_period_and_damping(
+    period: FloatArray, damping: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ln period and ln damping, in s and fractions of critical."""
+    return np.log(period), np.log(np.maximum(damping, SMALLEST_DAMPING))
+
+
+def stored_log(
+    spectra: LogSpectra, row: NDArray[np.intp], log_period: FloatArray, log_damping: FloatArray
+) -> FloatArray:
+    """
+    Interpolate stored logarithms at (ln period, ln damping); constant beyond the grid.
+
+    Parameters
+    ----------
+    spectra : LogSpectra
+        The grid.
+    row : ndarray of int
+        Of the azimuth.
+    log_period, log_damping : ndarray
+        Of the shape of the rows, or broadcast to it.
+
+    Returns
+    -------
+    stored : ndarray
+        ln PER or ln SD in m, bilinear on the logarithmic axes.
+    """
+    periods, dampings, radii = spectra
+    # cell of the grid and position in it, along either axis
+    column, period_share = _lower_neighbour(periods, log_period)
+    plane, damping_share = _lower_neighbour(dampings, log_damping)
+    next_plane = np.minimum(plane + 1, dampings.size - 1)
+    next_column = np.minimum(column + 1, periods.size - 1)
+    # along the period at the damping below and at that above, then from one to the other
+    left, right = radii[row, plane, column], radii[row, plane, next_column]
+    lower = (1 - period_share) * left + period_share * right
+    left, right = radii[row, next_plane, column], radii[row, next_plane, next_column]
+    upper = (1 - period_share) * left + period_share * right
+    stored: FloatArray = (1 - damping_share) * lower + damping_share * upper
+    return stored
+
+
+def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the lower neighbour on a grid, and the fraction towards the next one, 0 to 1."""
+    if grid.size == 1:
+        return np.zeros(points.shape, dtype=np.intp), np.zeros(points.shape)
+    lower = np.clip(np.searchsorted(grid, points) - 1, 0, grid.size - 2)
+    return lower, np.clip((points - grid[lower]) / (grid[lower + 1] - grid[lower]), 0.0, 1.0)
 
 
 class StationMotion(NamedTuple):
@@ -107,3 +194,97 @@ def _log_spectra(station: xr.Dataset, stored: NDArray[np.float32]) -> LogSpectra
     radii = np.log(np.maximum(stored.astype(np.float64), np.finfo(np.float32).tiny))
     dampings = np.log(np.maximum(station["damping"].to_numpy(), SMALLEST_DAMPING))
     return LogSpectra(np.log(station["period"].to_numpy()), dampings, np.ascontiguousarray(radii))
+
+
+class PairMotion(NamedTuple):
+    """
+    Response of pairs of buildings to a record, (n_pairs, n_azimuths).
+
+    Attributes
+    ----------
+    azimuth : ndarray
+        Of the ground motion, degrees clockwise from north; NaN where the only sensor's azimuth is
+        unknown.
+    per, sd : pairs of ndarray
+        Pseudo energy radius and spectral displacement of the two oscillators, m.
+    correlation : ndarray
+        Of the two responses over all time, dimensionless.
+    """
+
+    azimuth: FloatArray
+    per: tuple[FloatArray, FloatArray]
+    sd: tuple[FloatArray, FloatArray]
+    correlation: FloatArray
+
+
+def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
+    """
+    Compute the motion along one azimuth per pair.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record.
+    pairs : Table
+        With periods and dampings of both buildings.
+    azimuth : (n_pairs,) ndarray
+        Degrees clockwise from north.
+    """
+    motion = station.north, station.east, station.dt
+    (period_1, damping_1), (period_2, damping_2) = _oscillators(pairs)
+    per_1, sd_1 = azimuth_maxima(*motion, period_1, damping_1, azimuth)
+    per_2, sd_2 = azimuth_maxima(*motion, period_2, damping_2, azimuth)
+    # every pair has one azimuth: arrays (n_pairs, 1)
+    return PairMotion(
+        azimuth=azimuth[:, None],
+        per=(per_1[:, None], per_2[:, None]),
+        sd=(sd_1[:, None], sd_2[:, None]),
+        correlation=_correlation(station, pairs, azimuth[:, None]),
+    )
+
+
+def motion_of_one_horizontal(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along the only horizontal of a station, whatever the pairs' azimuths."""
+    motion = motion_along_azimuths(station, pairs, np.zeros(len(pairs["azimuth"])))
+    return motion._replace(azimuth=np.full_like(motion.azimuth, station.sensor_azimuth))
+
+
+def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along every degree of the half circle, for pairs of unknown azimuth."""
+    oscillators_1, oscillators_2 = _oscillators(pairs)
+    per_1, sd_1 = _every_radius(station, *oscillators_1)
+    per_2, sd_2 = _every_radius(station, *oscillators_2)
+    return PairMotion(
+        azimuth=np.broadcast_to(EVERY_AZIMUTH, per_1.shape),
+        per=(per_1, per_2),
+        sd=(sd_1, sd_2),
+        correlation=_correlation(station, pairs, EVERY_AZIMUTH[None, :]),
+    )
+
+
+def _oscillators(pairs: Table) -> list[tuple[FloatArray, FloatArray]]:
+    """Return period and damping of buildings 1 and of buildings 2."""
+    return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
+
+
+def _correlation(station: StationMotion, pairs: Table, azimuths: FloatArray) -> FloatArray:
+    """Return the correlation of both responses along azimuths (n_pairs or 1, n_azimuths)."""
+    first, second = _oscillators(pairs)
+    motion = station.north, station.east, station.dt
+    return directional_correlation(*motion, *first, *second, azimuths)
+
+
+def _every_radius(
+    station: StationMotion, periods: FloatArray, dampings: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return PER and SD along every azimuth, (n, 180); equal oscillators are computed once."""
+    motion = station.north, station.east, station.dt
+    per, sd = np.empty((2, periods.size, EVERY_AZIMUTH.size))
+    for damping in np.unique(dampings):
+        damped = np.flatnonzero(dampings == damping)
+        # one spectrum of the distinct periods serves all oscillators of this damping
+        distinct, position = np.unique(periods[damped], return_inverse=True)
+        spectrum = distinct, damping, EVERY_AZIMUTH
+        per[damped] = azimuthal_per_spectrum(*motion, *spectrum)[position]
+        sd[damped] = azimuthal_sd_spectrum(*motion, *spectrum)[position]
+    return per, sd

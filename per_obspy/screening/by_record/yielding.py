@@ -22,10 +22,11 @@ from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.equivalent_linear import iwan
 from per_obspy.pounding.linearization import NARROW, record_bandwidth
-from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
-from per_obspy.screening.by_record.stored_spectra import (
+from per_obspy.screening.by_record.station_motion import (
     LogSpectra,
+    StationMotion,
     log_period_and_damping,
+    nearest_azimuth,
     stored_log,
 )
 from per_obspy.screening.values import Columns, Table, both, chosen, values

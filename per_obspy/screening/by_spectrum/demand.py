@@ -17,7 +17,7 @@ from per_obspy.config import Screening
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.single_hit import SingleHit, single_hit
-from per_obspy.screening.by_record.demand import demand_ratio
+from per_obspy.screening.by_record.estimates import demand_ratio
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.ranking import pounding_state, risk_class

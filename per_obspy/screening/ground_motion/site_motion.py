@@ -20,10 +20,14 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
 from per_obspy.constants import REFERENCE_DAMPING
-from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
-from per_obspy.screening.ground_motion.kriging import MotionField, fitted_field, motion_at, on_grid
-from per_obspy.screening.ground_motion.sites import Sites, sites
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.screening.ground_motion.assignment import Sites, Stations, site_class_of, sites
+from per_obspy.screening.ground_motion.field import (
+    MotionField,
+    fitted_field,
+    great_circle,
+    motion_at,
+    on_grid,
+)
 from per_obspy.screening.values import number, values
 
 #: Largest distance between epicentres of one earthquake, m: agencies differ by less.

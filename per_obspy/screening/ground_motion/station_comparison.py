@@ -26,7 +26,7 @@ from per_obspy.screening.ground_motion.amplitudes import (
     peak_sentence,
 )
 from per_obspy.screening.ground_motion.assignment import site_class_of
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.screening.ground_motion.field import great_circle
 from per_obspy.screening.values import number
 
 #: A place is wrong if it is farther from the middle of the stations than this, m, and than so many

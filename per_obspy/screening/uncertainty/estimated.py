@@ -15,14 +15,20 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
 from per_obspy.pounding.correlation import ddc_correlation
-from per_obspy.screening.by_record.stored_spectra import (
+from per_obspy.screening.by_record.station_motion import (
     LogSpectra,
     log_period_and_damping,
     stored_log,
 )
-from per_obspy.screening.uncertainty.nodes import BUILDINGS, LARGEST_DAMPING, NODES
-from per_obspy.screening.uncertainty.population import COLUMNS, Uncertain, population
-from per_obspy.screening.uncertainty.severity import RelativeMotion
+from per_obspy.screening.uncertainty.population import (
+    BUILDINGS,
+    COLUMNS,
+    LARGEST_DAMPING,
+    NODES,
+    RelativeMotion,
+    Uncertain,
+    population,
+)
 from per_obspy.screening.values import Columns, Table, chosen, values
 
 #: Median and log-standard deviation of the gap from SD and eq. (16) over the exact one: 91 pairs of

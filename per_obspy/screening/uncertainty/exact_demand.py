@@ -2,8 +2,8 @@
 Population of pairs at one station; where the record supports a pair, by its exact demand.
 
 The record drives the buildings of every node. Their exact relative displacement is the demand of
-the node, and their relative velocity that of ``severity.py``, whether periods were given or
-derived; both are carried to the site (``site_demand.py``). So equal buildings of uncertain period
+the node, and their relative velocity that of ``population.py``, whether periods were given or
+derived; both are carried to the site (``motion.py``). So equal buildings of uncertain period
 or damping are not certain to move as one, and stiff buildings, which follow slow ground, do not hit
 as if they vibrated freely. Elsewhere, and where the estimate shows that a pair of derived
 periods does not touch, estimates take the place of the record.
@@ -42,27 +42,27 @@ from per_obspy.screening.uncertainty.estimated import (
     estimated_motion,
     estimated_population,
 )
-from per_obspy.screening.uncertainty.nodes import (
-    NODES,
-    building_is_uncertain,
-    damping_at_nodes,
-    gap_dispersion,
-    median_gap,
-    period_at_nodes,
+from per_obspy.screening.uncertainty.motion import (
+    SiteDemand,
+    is_exact,
+    ln_field_demand,
+    median_at_site,
+    record_motion,
+    site_demand,
 )
 from per_obspy.screening.uncertainty.population import (
     COLUMNS,
+    NODES,
+    RelativeMotion,
     Uncertain,
+    building_is_uncertain,
     chance_of_contact,
+    damping_at_nodes,
+    gap_dispersion,
+    impact_velocity,
+    median_gap,
+    period_at_nodes,
     population,
-)
-from per_obspy.screening.uncertainty.record_motion import is_exact, record_motion
-from per_obspy.screening.uncertainty.severity import RelativeMotion, impact_velocity
-from per_obspy.screening.uncertainty.site_demand import (
-    SiteDemand,
-    ln_field_demand,
-    median_at_site,
-    site_demand,
 )
 from per_obspy.screening.values import Columns, Table, both, chosen, only, values
 
@@ -94,7 +94,7 @@ NEGLIGIBLE = 1e-4
 #: Demand / sum of the radii below which two oscillators move as one.
 ROUND_OFF = 1e-12
 
-#: Exact impact velocity at the medians / that of ``severity.py``: limits of plausible ratios.
+#: Exact impact velocity at the medians / that of ``population.py``: limits of plausible ratios.
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 
 #: Columns of a pair from which its demand at the site and its history follow.

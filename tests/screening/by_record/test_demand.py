@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.screening.by_record.demand import (
+from per_obspy.screening.by_record.estimates import (
     demand_ratio,
     gap_estimates,
     governing_demand,

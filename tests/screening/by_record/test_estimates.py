@@ -9,7 +9,7 @@ from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import EXACT_COLUMNS
-from per_obspy.screening.by_record.pair_radii import motion_along_every_azimuth
+from per_obspy.screening.by_record.station_motion import motion_along_every_azimuth
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.rows import INTERMEDIATE

@@ -7,7 +7,7 @@ from screening_samples import make_station, table_of
 
 import per_obspy
 from per_obspy.pounding.relative import yielding_relative_displacement
-from per_obspy.screening.by_record.exact_damping import (
+from per_obspy.screening.by_record.exact import (
     HALVINGS,
     SCAN_STEP,
     least_exact_damping,

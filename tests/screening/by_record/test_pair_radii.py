@@ -6,13 +6,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import make_station
 
 import per_obspy
-from per_obspy.screening.by_record.pair_radii import (
+from per_obspy.screening.by_record.station_motion import (
     EVERY_AZIMUTH,
     motion_along_azimuths,
     motion_along_every_azimuth,
     motion_of_one_horizontal,
+    station_motion,
 )
-from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.values import chosen
 
 #: The second and the fourth pair share an oscillator with another pair.

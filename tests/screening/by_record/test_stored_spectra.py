@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.screening.by_record.stored_spectra import (
+from per_obspy.screening.by_record.station_motion import (
     SMALLEST_DAMPING,
     LogSpectra,
     log_oscillator,

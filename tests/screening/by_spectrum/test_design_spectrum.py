@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.errors import CatalogError
-from per_obspy.screening.by_spectrum.design_spectrum import (
+from per_obspy.screening.by_spectrum.design import (
     displacement_at,
     read_design_spectrum,
     within,

@@ -9,8 +9,7 @@ from scipy.special import ndtr
 from per_obspy.config import Building, Codes, Screening
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
-from per_obspy.screening.by_spectrum.design_spectrum import DesignSpectrum
-from per_obspy.screening.by_spectrum.design_table import DESIGN, LEADING, design_table
+from per_obspy.screening.by_spectrum.design import DESIGN, LEADING, DesignSpectrum, design_table
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
 

@@ -8,9 +8,9 @@ from shakemap_samples import PERIODS, make_map
 
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.stored_spectra import stored_log
+from per_obspy.screening.by_record.station_motion import stored_log
 from per_obspy.screening.by_spectrum.demand import spectral_demand
-from per_obspy.screening.by_spectrum.shakemap_motion import (
+from per_obspy.screening.by_spectrum.shakemap import (
     DAMPINGS,
     MapMotion,
     at_period,

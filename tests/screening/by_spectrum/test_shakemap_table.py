@@ -15,7 +15,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback, shakemap_rows
+from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback, shakemap_rows
 from per_obspy.screening.columns import FLAGS, ORDER
 
 

@@ -8,11 +8,11 @@ from per_obspy.screening.ground_motion.amplitudes import (
     REJECTED,
     Earthquake,
     Peaks,
+    ln_median,
     peak_deviations,
     peak_sentence,
 )
-from per_obspy.screening.ground_motion.attenuation import ln_median
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.screening.ground_motion.field import great_circle
 
 SOURCE = Earthquake(30.0, 40.0, 10_000.0, 6.5)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.screening.ground_motion.attenuation import (
+from per_obspy.screening.ground_motion.amplitudes import (
     deviations,
     ln_median,
     rupture_length,

@@ -8,10 +8,14 @@ from motion_samples import EVERY_PERIOD, SETTINGS, interpolated_motion
 from numpy.testing import assert_allclose
 
 from per_obspy.config import Interpolation
-from per_obspy.screening.ground_motion.assignment import nearest_station
-from per_obspy.screening.ground_motion.kriging import NEIGHBOURS, fitted_field, motion_at
-from per_obspy.screening.ground_motion.sites import sites
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle, spatial_correlation
+from per_obspy.screening.ground_motion.assignment import nearest_station, sites
+from per_obspy.screening.ground_motion.field import (
+    NEIGHBOURS,
+    fitted_field,
+    great_circle,
+    motion_at,
+    spatial_correlation,
+)
 
 PERIODS = [0.3, 1.0, 3.0]
 
@@ -298,7 +302,7 @@ def test_the_nearest_stations_decide_nearly_as_all_do(monkeypatch):
 
     places = sites(*random.uniform(-0.3, 0.3, (2, 300)))
     near = motion_at(field, places, np.ones(300))
-    monkeypatch.setattr("per_obspy.screening.ground_motion.kriging.NEIGHBOURS", 120)
+    monkeypatch.setattr("per_obspy.screening.ground_motion.field.NEIGHBOURS", 120)
     every = motion_at(field, places, np.ones(300))
     # screening: 0.2 % and 0.07 deviations were found over several seeds; eight neighbours give 3 %
     # and 0.4

@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose
 from screening_samples import make_station
 
 from per_obspy.config import Interpolation
+from per_obspy.screening.ground_motion.field import great_circle, spatial_correlation
 from per_obspy.screening.ground_motion.site_motion import (
     Hypocentre,
     hypocentre_of,
     motion_at_pairs,
     prepared_field,
 )
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle, spatial_correlation
 
 SETTINGS = Interpolation()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from per_obspy.screening.ground_motion.sites import sites
+from per_obspy.screening.ground_motion.assignment import sites
 
 
 def test_one_value_holds_for_all_places():

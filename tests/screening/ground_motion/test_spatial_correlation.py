@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.screening.ground_motion.assignment import nearest_station
-from per_obspy.screening.ground_motion.spatial_correlation import great_circle, spatial_correlation
+from per_obspy.screening.ground_motion.field import great_circle, spatial_correlation
 
 
 @pytest.mark.parametrize(

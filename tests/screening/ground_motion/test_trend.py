@@ -5,8 +5,8 @@ from motion_samples import SETTINGS, interpolated_motion
 from numpy.testing import assert_allclose
 
 from per_obspy.config import Interpolation
-from per_obspy.screening.ground_motion.sites import sites
-from per_obspy.screening.ground_motion.trend import features_of, fitted_group
+from per_obspy.screening.ground_motion.assignment import sites
+from per_obspy.screening.ground_motion.field import features_of, fitted_group
 
 
 def test_two_instruments_at_one_place_count_as_one():

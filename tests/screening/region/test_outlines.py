@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from per_obspy.screening.region.outlines import box_outlines, hexagon_outlines, hexagons
-from per_obspy.screening.region.totals import grid_cells
+from per_obspy.screening.region.totals import box_outlines, grid_cells, hexagon_outlines, hexagons
 
 
 def test_indices_are_the_published_ones():

@@ -6,11 +6,10 @@ from screening_samples import make_pairs, make_station
 
 import per_obspy
 from per_obspy.config import Screening
-from per_obspy.screening.by_record.station_motion import station_motion
-from per_obspy.screening.by_record.stored_spectra import stored_log
+from per_obspy.screening.by_record.station_motion import station_motion, stored_log
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.uncertainty.exact_demand import record_population
-from per_obspy.screening.uncertainty.pair_motion import period_correlation
+from per_obspy.screening.uncertainty.motion import period_correlation
 
 #: Of the critical gap by PER over the exact one.
 MEDIAN = Screening().model_median

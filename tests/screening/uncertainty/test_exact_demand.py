@@ -20,9 +20,8 @@ from per_obspy.screening.uncertainty.exact_demand import (
     record_population,
     resolved_probability,
 )
-from per_obspy.screening.uncertainty.nodes import NODES
-from per_obspy.screening.uncertainty.population import COLUMNS, chance_of_contact
-from per_obspy.screening.uncertainty.site_demand import pair_at_site
+from per_obspy.screening.uncertainty.motion import pair_at_site
+from per_obspy.screening.uncertainty.population import COLUMNS, NODES, chance_of_contact
 
 #: Two equal buildings of given dampings, at contact height of one-storey oscillators.
 EQUAL = {

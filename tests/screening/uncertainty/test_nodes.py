@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import lognorm, truncnorm
 
-from per_obspy.screening.uncertainty.nodes import (
+from per_obspy.screening.uncertainty.population import (
     NODES,
     building_is_uncertain,
     damping_at_nodes,

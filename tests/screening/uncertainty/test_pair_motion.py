@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from per_obspy.screening.uncertainty.pair_motion import pair_motion, period_correlation
+from per_obspy.screening.uncertainty.motion import pair_motion, period_correlation
 
 periods = st.floats(0.01, 10.0)
 

@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import table_of
 
 from per_obspy.config import Screening
-from per_obspy.screening.uncertainty.pair_motion import pair_motion
-from per_obspy.screening.uncertainty.record_motion import record_motion
+from per_obspy.screening.uncertainty.motion import pair_motion, record_motion
 from per_obspy.screening.values import at_contact, both
 
 #: One exact demand, one estimate outside the usable periods, one of derived periods, and one of

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pairs.node_outcomes import LOSS
-from per_obspy.screening.uncertainty.severity import RelativeMotion, impact_velocity
+from per_obspy.screening.uncertainty.population import RelativeMotion, impact_velocity
 
 SHARES = st.floats(0.0, 0.999)
 

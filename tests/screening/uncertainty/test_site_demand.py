@@ -8,11 +8,11 @@ from screening_samples import make_pairs, table_of
 
 import per_obspy
 from per_obspy.config import Interpolation, Screening
-from per_obspy.screening.uncertainty.pair_motion import pair_motion
-from per_obspy.screening.uncertainty.site_demand import (
+from per_obspy.screening.uncertainty.motion import (
     demand_correlation,
     estimate_log_std,
     median_at_site,
+    pair_motion,
     site_demand,
 )
 from per_obspy.screening.values import at_contact, both

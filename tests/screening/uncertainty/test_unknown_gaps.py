@@ -10,11 +10,10 @@ from shakemap_samples import make_map
 import per_obspy
 from per_obspy.config import Building, Codes, Screening
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_spectrum.design_spectrum import DesignSpectrum
-from per_obspy.screening.by_spectrum.design_table import design_table
-from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback
+from per_obspy.screening.by_spectrum.design import DesignSpectrum, design_table
+from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback
 from per_obspy.screening.ground_motion.assignment import assigned, stations_of
-from per_obspy.screening.uncertainty.nodes import gap_dispersion, median_gap
+from per_obspy.screening.uncertainty.population import gap_dispersion, median_gap
 from per_obspy.screening.uncertainty.unknown_gaps import NUMBERS, TEXTS, UNKNOWN_CLASS, kept_apart
 
 #: Pairs that differ in how their demand is found, and one of everything that codes ask for.
