@@ -54,4 +54,4 @@ from .spectra.bilinear import constant_yield_spectra as constant_yield_spectra
 from .spectra.elastic import per_spectrum as per_spectrum
 from .spectra.elastic import response_spectra as response_spectra
 from .spectra.station import station_spectra as station_spectra
-from .spectra.stream import stream_spectra as stream_spectra
+from .spectra.storage import stream_spectra as stream_spectra

@@ -15,12 +15,11 @@ from typing import Annotated
 import typer
 
 import per_obspy
-from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init, warm_up
-from per_obspy.commands.operation.status import status
-from per_obspy.commands.operation.watch import watch
+from per_obspy.commands.operation import status, watch
 from per_obspy.commands.pairs import catalog, pairs
+from per_obspy.commands.printing import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen

@@ -1,7 +1,7 @@
 """
 The command line as a user meets it: help, exit codes, one line per error, no traceback.
 
-Covers ``per_obspy.commands.endings``, ``per_obspy.commands.printing`` and
+Covers ``per_obspy.commands.printing``, ``per_obspy.commands.printing`` and
 ``per_obspy.commands.run``.
 """
 

@@ -10,9 +10,9 @@ from pydantic.fields import FieldInfo
 from tables import code, table, write_page
 
 from per_obspy.config.ensemble import Ensemble
+from per_obspy.config.pairs import Simulation
 from per_obspy.config.run import Design, Run
 from per_obspy.config.section import Section, sections_of
-from per_obspy.config.simulation import Simulation
 
 #: Models of whole files: title and first lines of their part of the page.
 FILES: dict[str, tuple[type[Section], str]] = {

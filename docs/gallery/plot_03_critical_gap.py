@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import per_obspy
-from per_obspy.config.simulation import Scenario
+from per_obspy.config.pairs import Scenario
 from per_obspy.records.simulation.earthquake import rock_acceleration
 
 scenario = Scenario(magnitude=6.8)

@@ -9,7 +9,7 @@ and the energy that each impact moves from one building to the other.
 import matplotlib.pyplot as plt
 
 import per_obspy
-from per_obspy.config.simulation import Scenario
+from per_obspy.config.pairs import Scenario
 from per_obspy.records.simulation.earthquake import rock_acceleration
 
 scenario = Scenario(magnitude=6.8)

@@ -8,7 +8,7 @@ Simulate an earthquake at six stations, process the records, and rank 200 pairs 
 import matplotlib.pyplot as plt
 
 import per_obspy
-from per_obspy.config.simulation import Scenario
+from per_obspy.config.pairs import Scenario
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.records.simulation.earthquake import simulate
 

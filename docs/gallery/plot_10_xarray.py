@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import xarray as xr
 
 import per_obspy
-from per_obspy.config.simulation import Scenario
+from per_obspy.config.pairs import Scenario
 from per_obspy.records.simulation.earthquake import simulate
 
 simulation = simulate(Scenario(magnitude=6.8, stations=2))

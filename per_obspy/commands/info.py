@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, named_path, stop_if_nothing
-from per_obspy.commands.printing import print_table
+from per_obspy.commands.printing import AsJson, named_path, print_table, stop_if_nothing
 from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from per_obspy.commands.endings import named_path, output_option
+from per_obspy.commands.printing import named_path, output_option
 from per_obspy.errors import printable
 
 

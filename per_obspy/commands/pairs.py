@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from per_obspy.commands.endings import WRONG_INPUT, AsJson, output_option, stop_if_nothing
-from per_obspy.commands.printing import print_table
+from per_obspy.commands.printing import (
+    WRONG_INPUT,
+    AsJson,
+    output_option,
+    print_table,
+    stop_if_nothing,
+)
 from per_obspy.errors import CatalogError, printable, require_extra
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.endings import AsJson, stop_if_nothing
-from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.commands.printing import AsJson, print_table, shown_progress, stop_if_nothing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import (
-    AsJson,
-    Dask,
-    Language,
-    Strict,
-    named_path,
-    output_option,
-    print_and_end,
-    stop_if_nothing,
-)
-from per_obspy.commands.operation.logged import (
+from per_obspy.commands.operation import (
     LogFile,
     LogForm,
     LogFormat,
@@ -26,7 +16,20 @@ from per_obspy.commands.operation.logged import (
     log_ending,
     logged,
 )
-from per_obspy.commands.printing import percent, print_table, shown_progress, state_texts
+from per_obspy.commands.printing import (
+    AsJson,
+    Dask,
+    Language,
+    Strict,
+    named_path,
+    output_option,
+    percent,
+    print_and_end,
+    print_table,
+    shown_progress,
+    state_texts,
+    stop_if_nothing,
+)
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
 
@@ -297,7 +300,7 @@ def print_nothing(result: "Result") -> None:
 
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
-    from per_obspy.tables.ranked.ranked_files import listed_outputs
+    from per_obspy.tables.ranked_table import listed_outputs
 
     folder, record = result.folder, result.record
     if result.did_nothing:
@@ -431,8 +434,7 @@ def _print_worst(folder: Path, count: int) -> None:
 def _worst_rows(folder: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
     """Return the worst rows of the risk table; empty cells are None."""
     # Without libraries of tables, which a finished run would wait for
-    from per_obspy.tables.ranked.ranked_files import table_files
-    from per_obspy.tables.ranked.ranked_table import ranked_table
+    from per_obspy.tables.ranked_table import ranked_table, table_files
 
     with ranked_table(table_files(folder)) as table:
         found = [row for rows in table.ranked(count, columns) for row in rows.to_pylist()]

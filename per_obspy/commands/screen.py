@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from per_obspy.commands.endings import (
-    AsJson,
-    Dask,
-    Language,
-    Strict,
-    output_option,
-    print_and_end,
-    stop_if_nothing,
-    why_nothing,
-)
-from per_obspy.commands.operation.logged import (
+from per_obspy.commands.operation import (
     LogFile,
     LogForm,
     LogFormat,
@@ -25,7 +15,19 @@ from per_obspy.commands.operation.logged import (
     log_ending,
     logged,
 )
-from per_obspy.commands.printing import percent, print_table, state_texts
+from per_obspy.commands.printing import (
+    AsJson,
+    Dask,
+    Language,
+    Strict,
+    output_option,
+    percent,
+    print_and_end,
+    print_table,
+    state_texts,
+    stop_if_nothing,
+    why_nothing,
+)
 from per_obspy.commands.run import print_coverage, print_nothing, print_result
 from per_obspy.errors import printable
 
@@ -181,7 +183,7 @@ def _write_design(
 ) -> list[Path]:
     """Write the files of a screening by a design spectrum, ``rejected.csv`` last."""
     from per_obspy.pipeline.results.table_report import report_design
-    from per_obspy.tables.design import write_design
+    from per_obspy.tables.risk import write_design
 
     *files, rejected = write_design(table, folder)
     made = report_design(settings, table, coverage, folder)

@@ -1,11 +1,141 @@
-"""Settings of the building pairs of a run: their source, and the form of their table."""
+"""Pairs of a run: tables, simulated inventories and rows of buildings."""
 
+from datetime import datetime
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import (
+    Field,
+    field_validator,
+    model_validator,
+)
 
 from per_obspy.config.section import RelativePath, Section
-from per_obspy.config.simulation import SimulatedPairs
+
+
+class Scenario(Section):
+    """A simulated earthquake and the stations that record it (stochastic method, Boore 2003)."""
+
+    seed: int = Field(
+        20, ge=0, description="of every random number; the same seed gives the same samples"
+    )
+    name: str = Field("Simulated earthquake", description="of the event")
+    magnitude: float = Field(7.0, ge=4, le=8.5, description="moment magnitude")
+    origin_time: str = Field("2000-01-01T00:00:00", description="ISO 8601, UTC")
+    latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
+    longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
+    depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
+    density: float = Field(2800.0, ge=1000, le=5000, description="kg/m3 at the source (Boore 2003)")
+    shear_velocity: float = Field(
+        3500.0, ge=100, le=6000, description="m/s at the source (Boore 2003)"
+    )
+    quality: float = Field(180.0, gt=0, description="Q at 1 Hz (Raoof and others 1999)")
+    quality_exponent: float = Field(
+        0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)"
+    )
+    kappa: float = Field(0.035, ge=0, description="s; generic rock (Boore & Joyner 1997)")
+    stations: int = Field(24, ge=1, le=999, description="number of stations")
+    city_latitude: float = Field(
+        0.0, ge=-90, le=90, description="centre of the stations, degrees north"
+    )
+    city_longitude: float = Field(
+        0.3, ge=-180, le=180, description="centre of the stations, degrees east"
+    )
+    city_radius: float = Field(12_000.0, gt=0, description="m")
+    lakebed_latitude: float = Field(
+        0.0, ge=-90, le=90, description="centre of the lakebed, degrees north"
+    )
+    lakebed_longitude: float = Field(
+        0.3, ge=-180, le=180, description="centre of the lakebed, degrees east"
+    )
+    lakebed_radius: float = Field(6_000.0, ge=0, description="m; 0: no lakebed")
+    lakebed_frequency: float = Field(
+        0.5, gt=0, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6"
+    )
+    lakebed_damping: float = Field(
+        0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical"
+    )
+    lakebed_scatter: float = Field(
+        0.1, ge=0, description="log-standard deviation of its frequency between stations"
+    )
+    site_log_std: float = Field(
+        0.7,
+        ge=0,
+        le=1.5,
+        description="log-standard deviation of the Fourier spectrum between places",
+    )
+    site_reach: float = Field(
+        25_000.0,
+        gt=0,
+        description="m, where its correlation between places has fallen to 0.05 (SA at 1 s: "
+        "Jayaram & Baker 2009)",
+    )
+    correlation: float = Field(
+        0.3, ge=-1, le=1, description="between the north and east components"
+    )
+    vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum")
+    noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
+    pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
+    dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")
+
+    @field_validator("origin_time")
+    @classmethod
+    def _a_time(cls, origin_time: str) -> str:
+        datetime.fromisoformat(origin_time)
+        return origin_time
+
+
+class SimulatedPairs(Section):
+    """A simulated inventory around the stations of a run."""
+
+    count: int = Field(2000, ge=1, description="number of pairs")
+    seed: int = Field(20, ge=0, description="seed of all random numbers")
+    radius: float = Field(
+        2000.0, gt=0, description="largest distance of a pair from its station, m"
+    )
+    touching: float = Field(
+        0.5, ge=0, le=1, description="share of pairs without a gap, from 0 to 1"
+    )
+
+
+class Simulation(Section):
+    """A simulated earthquake, its stations, and the pairs of buildings around them."""
+
+    scenario: Scenario = Scenario()
+    pairs: SimulatedPairs = SimulatedPairs()
+
+
+#: Buildings of the longest row that may be configured: the cost of a row grows with its impacts.
+MOST_BUILDINGS = 200
+
+
+class Rows(Section):
+    """Settings of joining pairs to rows of buildings (docs/rows.md)."""
+
+    enabled: bool | None = Field(
+        None,
+        description=(
+            "write rows.parquet and buildings.*; if not set: where the pair table has "
+            "building_id_1 and building_id_2"
+        ),
+    )
+    exact: bool | None = Field(
+        None, description="exact history of every row of buildings; if not set: as screening.exact"
+    )
+    angle: float = Field(
+        30.0,
+        gt=0,
+        lt=90,
+        description="largest angle between the axes of two pairs of a row, degrees",
+    )
+    longest: int = Field(
+        30,
+        ge=3,
+        le=MOST_BUILDINGS,
+        description=(
+            "largest number of buildings of a row; a longer one is cut at its widest gap, "
+            "and flagged"
+        ),
+    )
 
 
 class TableForm(Section):

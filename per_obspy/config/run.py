@@ -8,12 +8,11 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.building_rows import Rows
 from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.operation.notify import Notify
 from per_obspy.config.operation.watch import Watch
-from per_obspy.config.pairs import Pairs
+from per_obspy.config.pairs import Pairs, Rows
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, ReportTexts, Screening, Totals

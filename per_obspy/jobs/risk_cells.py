@@ -22,15 +22,15 @@ from per_obspy.jobs.parallel import Work, new_and_resumed
 from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.tables.parts import joined_schema
-from per_obspy.tables.ranked.arranged_parts import (
+from per_obspy.tables.ranked_cells import (
+    CellCounts,
     CellRows,
     ranks_file,
     write_arranged,
+    write_cell,
     write_ranks,
 )
-from per_obspy.tables.ranked.cell_files import CellCounts, write_cell
-from per_obspy.tables.ranked.ranked_files import table_files
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.ranked_table import ranked_table, table_files
 from per_obspy.tables.risk import RiskFiles, ranked_schema, write_worst_rows
 from per_obspy.tables.table_files import write_columns
 

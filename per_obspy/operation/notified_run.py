@@ -19,7 +19,7 @@ from per_obspy.operation.logs import without_secrets
 from per_obspy.operation.notification import Message, notify
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
-from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked_table import table_files
 
 log = logging.getLogger(__name__)
 

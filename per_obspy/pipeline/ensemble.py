@@ -33,7 +33,7 @@ from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
 from per_obspy.tables.coverage import Coverage, most_first
 from per_obspy.tables.ensemble import Scenarios, write_ensemble
-from per_obspy.tables.ranked.ranked_files import table_files, table_outputs
+from per_obspy.tables.ranked_table import table_files, table_outputs
 
 #: Written last.
 RECORD = "ensemble.json"

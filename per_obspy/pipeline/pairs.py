@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.config import Pairs, Run, Simulation, load
-from per_obspy.config.simulation import SimulatedPairs
+from per_obspy.config.pairs import SimulatedPairs
 from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.inventory.catalogue import (
     find_inventories,

@@ -24,7 +24,7 @@ from per_obspy.records.event_file import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
 from per_obspy.records.sources import find_path_sources
 from per_obspy.report.records import draw_records
-from per_obspy.tables.processed import write_processed_table
+from per_obspy.tables.station_summary import write_processed_table
 from per_obspy.tables.table_files import write_rejected
 
 STATIONS, STRUCTURES = "stations", "structures"

@@ -42,8 +42,7 @@ from per_obspy.report.tally import PAGE_PAIRS
 from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
 from per_obspy.tables.coverage import Coverage
-from per_obspy.tables.ranked.ranked_files import table_files
-from per_obspy.tables.ranked.ranked_table import RankedTable, ranked_table
+from per_obspy.tables.ranked_table import RankedTable, ranked_table, table_files
 
 
 def reported(

@@ -17,7 +17,7 @@ from per_obspy.jobs.parallel import prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
-from per_obspy.tables.ranked.ranked_files import table_outputs
+from per_obspy.tables.ranked_table import table_outputs
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:

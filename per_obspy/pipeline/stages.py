@@ -53,7 +53,7 @@ from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.resume import write_status
 from per_obspy.screening.warmup import compiling
 from per_obspy.tables.coverage import Coverage
-from per_obspy.tables.ranked.ranked_files import remove_table
+from per_obspy.tables.ranked_table import remove_table
 from per_obspy.tables.station_summary import StationSummary, write_stations
 
 

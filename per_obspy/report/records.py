@@ -26,7 +26,7 @@ from per_obspy.report.style import (
     USABLE_COLOUR,
     literal,
 )
-from per_obspy.tables.processed import COLUMNS
+from per_obspy.tables.station_summary import RECORD_COLUMNS
 
 SMOOTHING = Processing().smoothing  # b of the Konno-Ohmachi window
 PAGE = (11.7, 8.3)  # inches: A4, landscape
@@ -169,7 +169,7 @@ def _write_numbers(axes: Axes, processed: Any) -> None:
         if name not in chosen:
             continue
         # Numbers with their units, texts as they are
-        value, unit = chosen[name], COLUMNS[name][0].strip("1")
+        value, unit = chosen[name], RECORD_COLUMNS[name][0].strip("1")
         text = f"{value:.4g} {unit}" if isinstance(value, float) else literal(str(value))
         lines += textwrap.wrap(f"{name.replace('_', ' ')}: {text}", 68, subsequent_indent="    ")
     axes.set_axis_off()

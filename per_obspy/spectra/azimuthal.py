@@ -11,14 +11,16 @@ from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import azimuth_samples as kernels
 from per_obspy.kernels.spectra import azimuth_steps, azimuth_tiles
 from per_obspy.kernels.spectra import tile_search as blocks
-from per_obspy.spectra.elastic import grid_of, row_of, two_components
-from per_obspy.spectra.oscillator_blocks import (
+from per_obspy.spectra.elastic import (
     Oscillators,
     TiledRecord,
+    grid_of,
     over_blocks,
     prepare_oscillators,
+    row_of,
     stretches,
     tiled_record,
+    two_components,
 )
 from per_obspy.spectra.trace_arguments import takes_traces
 

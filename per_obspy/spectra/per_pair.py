@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.maxima.oscillator_maxima import largest_responses
-from per_obspy.spectra.elastic import row_of, two_components
-from per_obspy.spectra.oscillator_blocks import (
+from per_obspy.spectra.elastic import (
     Oscillators,
     TiledRecord,
     in_threads,
     prepare_oscillators,
+    row_of,
     tiled_record,
+    two_components,
 )
 
 #: Longest phase of a stride, rad, for an undamped oscillator, and by how much damping shortens it,

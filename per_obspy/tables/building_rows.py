@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
 from per_obspy.screening.building_rows.row_columns import FLAGS, ROWS
-from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.parts import text_columns
+from per_obspy.tables.table_files import regrouped, schema_of, table_of, write_meanings
 
 #: Rows of a row group.
 TOGETHER = 10_000

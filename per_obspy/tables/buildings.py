@@ -25,13 +25,13 @@ from per_obspy.inventory.schema import Column
 from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, BUILDINGS, FLAGS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, directions
-from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.parts import (
     batches,
     bounded_database,
     text_columns,
 )
 from per_obspy.tables.risk import write_worst
+from per_obspy.tables.table_files import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.totals import areas_of
 
 #: Sides of buildings that are reduced together, about.

@@ -20,7 +20,7 @@ from per_obspy.screening.region.ensemble import (
     ensemble_rows,
 )
 from per_obspy.tables.parts import bounded_database, parquet_rows
-from per_obspy.tables.ranked.ranked_table import ROWS
+from per_obspy.tables.ranked_table import ROWS
 from per_obspy.tables.risk import write_worst
 from per_obspy.tables.table_files import write_described, write_rejected
 

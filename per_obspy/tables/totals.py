@@ -22,8 +22,7 @@ from per_obspy.screening.region.totals import (
     joined_totals,
     partial_totals,
 )
-from per_obspy.tables.rounding import rounded_table
-from per_obspy.tables.table_files import write_csv
+from per_obspy.tables.table_files import rounded_table, write_csv
 
 #: Pieces that are joined together.
 TOGETHER = 16

@@ -20,13 +20,13 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import file_hash
 from per_obspy.tables.parts import TOGETHER, part_rows, text_columns
-from per_obspy.tables.ranked.arranged_parts import (
+from per_obspy.tables.ranked_cells import (
     BATCH,
     CellRows,
     arranged_rows,
     arranged_writer,
 )
-from per_obspy.tables.ranked.ranked_table import ROWS
+from per_obspy.tables.ranked_table import ROWS
 from per_obspy.threads import use_one_thread
 
 #: Bytes of a block, and number of blocks.

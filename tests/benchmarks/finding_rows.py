@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from per_obspy.config.building_rows import Rows
+from per_obspy.config.pairs import Rows
 from per_obspy.pipeline.rows.all_rows import all_rows
 from per_obspy.pipeline.rows.pair_columns import pair_columns
 

@@ -24,7 +24,7 @@ from per_obspy.progress import silent
 from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables.parts import write_part
-from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked_table import table_files
 from per_obspy.tables.risk import write_risk
 
 

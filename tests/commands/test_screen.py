@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from per_obspy.commands.endings import why_nothing
+from per_obspy.commands.printing import why_nothing
 from per_obspy.errors import Rejection
 from per_obspy.tables.table_files import write_rejected
 

@@ -3,7 +3,7 @@
 import pytest
 
 from per_obspy.config import Run, load
-from per_obspy.config.building_rows import Rows
+from per_obspy.config.pairs import Rows
 from per_obspy.errors import CatalogError
 
 

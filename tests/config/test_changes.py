@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from per_obspy.config import Run
-from per_obspy.config.changes import parsed_changes
+from per_obspy.config.commented import parsed_changes
 from per_obspy.errors import CatalogError
 
 

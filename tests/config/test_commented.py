@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from per_obspy.config import Ensemble, Run, checked
-from per_obspy.config.changes import dotted_keys
-from per_obspy.config.commented import commented, effective_content
+from per_obspy.config.commented import commented, dotted_keys, effective_content
 
 FOLDER = Path("/data/run")
 MINIMAL = {"name": "x", "output": "out", "records": {"folder": "in"}, "pairs": {"file": "p.csv"}}

@@ -1,8 +1,8 @@
 """
 The risk table by cell: the rows and ranks of the one table, resumed, whole or not at all.
 
-Covers ``per_obspy.tables.ranked.arranged_parts``, ``per_obspy.tables.ranked.cell_files`` and
-``per_obspy.tables.ranked.ranked_files``.
+Covers ``per_obspy.tables.ranked_cells`` and
+``per_obspy.tables.ranked_table``.
 """
 
 import pickle
@@ -21,8 +21,8 @@ from per_obspy.jobs.risk_cells import Means, write_cells, write_texts
 from per_obspy.progress import silent
 from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
+from per_obspy.tables import ranked_cells
 from per_obspy.tables.parts import write_part
-from per_obspy.tables.ranked import arranged_parts, cell_files
 from per_obspy.tables.risk import write_risk
 
 COUNT = 120
@@ -129,7 +129,7 @@ def test_nothing_is_written_elsewhere(expected):
 @pytest.mark.parametrize(("size", "most"), [(2, 4), (7, 64)])
 def test_bytes_do_not_depend_on_chunks(rows, expected, tmp_path, monkeypatch, size, most):
     # 60 parts of two rows are merged in several passes
-    monkeypatch.setattr(cell_files, "MOST_FILES", most)
+    monkeypatch.setattr(ranked_cells, "MOST_FILES", most)
     written(parts_of(rows.sample(frac=1.0, random_state=size), tmp_path, size), tmp_path)
     assert contents(tmp_path) == contents(expected)
     assert not (tmp_path / "cells").exists()
@@ -141,11 +141,10 @@ def test_bytes_do_not_depend_on_what_is_read_together(
 ):
     # Mutations: batches of a cell counted from its rows rounded down; ranks of a window taken
     # again in the next; the last window left out.
-    for module in (arranged_parts, cell_files):
-        monkeypatch.setattr(module, "BATCH", batch)
-    monkeypatch.setattr(cell_files, "TOGETHER", together)
-    monkeypatch.setattr(cell_files, "ROWS", 8)
-    monkeypatch.setattr(cell_files, "MOST_FILES", 3)
+    monkeypatch.setattr(ranked_cells, "BATCH", batch)
+    monkeypatch.setattr(ranked_cells, "RANKED_TOGETHER", together)
+    monkeypatch.setattr(ranked_cells, "ROWS", 8)
+    monkeypatch.setattr(ranked_cells, "MOST_FILES", 3)
     written(parts_of(rows, tmp_path, 10), tmp_path)
     # groups of rows have another size, so the values are compared
     for name in contents(expected):
@@ -157,23 +156,23 @@ def test_many_parts_are_merged_in_one_pass_with_one_batch_of_each(
     rows, expected, tmp_path, monkeypatch
 ):
     # would catch a second copy of the cells on the disk, and files that are read as a whole
-    monkeypatch.setattr(arranged_parts, "BATCH", 1)
+    monkeypatch.setattr(ranked_cells, "BATCH", 1)
     read, ahead = [0], []
 
-    def counted(one, batches=arranged_parts.arranged_rows):
+    def counted(one, batches=ranked_cells.arranged_rows):
         for batch in batches(one):
             read[0] += batch.num_rows
             yield batch
 
-    def merged(waiting, order, next_rows=cell_files.next_rows):
+    def merged(waiting, order, next_rows=ranked_cells.next_rows):
         taken = next_rows(waiting, order)
         read[0] -= taken.num_rows
         ahead.append(read[0])
         return taken
 
-    monkeypatch.setattr(cell_files, "arranged_rows", counted)
-    monkeypatch.setattr(cell_files, "next_rows", merged)
-    monkeypatch.setattr(cell_files, "_merged", None)
+    monkeypatch.setattr(ranked_cells, "arranged_rows", counted)
+    monkeypatch.setattr(ranked_cells, "next_rows", merged)
+    monkeypatch.setattr(ranked_cells, "_merged", None)
     written(parts_of(rows, tmp_path, 1), tmp_path)
     assert contents(tmp_path) == contents(expected)
     # no row but those that are wanted

@@ -1,4 +1,4 @@
-"""Health of a folder and its exit code; covers ``per_obspy.commands.operation.status``."""
+"""Health of a folder and its exit code; covers ``per_obspy.commands.operation``."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Logs of commands; covers ``per_obspy.commands.operation.logged``."""
+"""Logs of commands; covers ``per_obspy.commands.operation``."""
 
 import json
 import logging
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.commands.operation.logged import LogFormat, logged
+from per_obspy.commands.operation import LogFormat, logged
 from per_obspy.errors import CatalogError
 from per_obspy.operation.logs import without_secrets
 

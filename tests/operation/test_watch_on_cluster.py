@@ -13,7 +13,7 @@ from ..pipeline.small_run import InProcess, plain_figures
 
 pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
-from per_obspy.jobs.cluster import dask_client
+from per_obspy.jobs.cluster import dask_executor
 
 
 @pytest.fixture
@@ -26,9 +26,11 @@ def test_a_scheduler_that_ends_during_a_task_is_retried_at_the_next_pass(
     server, tmp_path, monkeypatch
 ):
     started = []
-    start = dask_client._local_cluster
+    start = dask_executor._local_cluster
     monkeypatch.setattr(
-        dask_client, "_local_cluster", lambda address: started.append(start(address)) or started[-1]
+        dask_executor,
+        "_local_cluster",
+        lambda address: started.append(start(address)) or started[-1],
     )
 
     def ending(stage, done, _):

@@ -21,8 +21,8 @@ from per_obspy.records.metadata import with_metadata
 from per_obspy.records.processed_files import described, write_description, write_processed
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.station import station_spectra
-from per_obspy.tables.processed import COLUMNS
-from per_obspy.tables.rounding import rounded
+from per_obspy.tables.station_summary import RECORD_COLUMNS
+from per_obspy.tables.table_files import rounded
 
 RATE, COUNT = 50.0, 3000
 ONE = (1, None, silent)
@@ -119,7 +119,7 @@ def test_the_table_has_every_corner_and_its_reason(source, tmp_path):
     processed(source, tmp_path / "out", highpass=0.1)
     table = pd.read_csv(tmp_path / "out" / "processed.csv")
     columns = pd.read_csv(tmp_path / "out" / "processed.columns.csv", keep_default_na=False)
-    assert list(table) == list(columns["name"]) == list(COLUMNS)
+    assert list(table) == list(columns["name"]) == list(RECORD_COLUMNS)
     # one row per component, with the corner of the configuration
     assert len(table) == 3
     assert (table["highpass"] == 0.1).all()
@@ -134,7 +134,7 @@ def test_every_number_of_a_record_has_a_column(source, tmp_path):
     described = {name for trace in note["traces"] for name in trace["per_obspy"]}
     # the mean and its window, and the order of the trend, are steps of the chain: ``processing``
     # lists them
-    assert described - set(COLUMNS) <= {"mean", "mean_of", "trend_order"}
+    assert described - set(RECORD_COLUMNS) <= {"mean", "mean_of", "trend_order"}
 
 
 #: Corners, windows, signal to noise and baseline of every trace; failed checks where there are any.

@@ -18,8 +18,8 @@ from per_obspy.pipeline.results import report_files
 from per_obspy.pipeline.results.report_files import Report
 from per_obspy.pipeline.run import report, run
 from per_obspy.report.results import Results
+from per_obspy.tables import ranked_table
 from per_obspy.tables.coverage import Coverage
-from per_obspy.tables.ranked import ranked_table
 
 from .small_run import InProcess, real_reports, write_configuration
 

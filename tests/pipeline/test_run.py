@@ -28,7 +28,7 @@ from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.progress import silent
 from per_obspy.screening.ranking import STATES
-from per_obspy.tables.rounding import rounded_table
+from per_obspy.tables.table_files import rounded_table
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 

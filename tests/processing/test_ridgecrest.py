@@ -8,7 +8,7 @@ from per_obspy.processing.chain import process_station
 from per_obspy.processing.station.components import is_horizontal
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.azimuthal import azimuthal_sd_spectrum, rotd
-from per_obspy.spectra.horizontals import north_and_east
+from per_obspy.spectra.station import north_and_east
 
 AZIMUTHS = np.arange(0.0, 180.0, 5.0)
 DAMPING, STEP = 0.05, 1.02  # fraction of critical; ratio of successive periods

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
-from per_obspy.spectra import oscillator_blocks
+from per_obspy.spectra import elastic
 from per_obspy.spectra.elastic import (
     per_spectrum,
     response_spectra,
@@ -242,7 +242,7 @@ def test_inputs_stay_unchanged_and_counts_are_numbers(noise):
 def test_threads_change_no_bit(noise, monkeypatch):
     periods = np.geomspace(0.05, 5.0, 300)
     alone = response_spectra(noise, DT, periods)
-    monkeypatch.setattr(oscillator_blocks, "STEPS_WORTH_THREADS", 0)
+    monkeypatch.setattr(elastic, "STEPS_WORTH_THREADS", 0)
     monkeypatch.setattr("per_obspy.threads.usable_processors", lambda: 4)
     for once, threaded in zip(alone, response_spectra(noise, DT, periods), strict=True):
         assert_array_equal(threaded, once)

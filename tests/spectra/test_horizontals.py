@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.spectra.horizontals import north_and_east
+from per_obspy.spectra.station import north_and_east
 
 MOTION = np.random.default_rng(1).normal(size=(2, 50))
 

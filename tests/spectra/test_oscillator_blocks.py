@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from per_obspy.kernels.spectra import tile_search as blocks
-from per_obspy.spectra.oscillator_blocks import (
+from per_obspy.spectra.elastic import (
     over_blocks,
     prepare_oscillators,
     stretches,

@@ -5,7 +5,7 @@ import pytest
 from obspy import Stream, Trace
 from obspy.core import AttribDict
 
-from per_obspy.spectra.record_facts import header_hypocentre, peak_motions, record_facts
+from per_obspy.spectra.station import header_hypocentre, peak_motions, record_facts
 
 
 def _trace(channel, source="", **known):

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from per_obspy.inventory.schema import Column
-from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
+from per_obspy.tables.table_files import regrouped, schema_of, table_of, write_meanings
 
 COLUMNS = (
     Column("count", "int64", "1", "how many"),

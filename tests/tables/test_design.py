@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.errors import Rejection
-from per_obspy.tables.design import FILES, write_design
+from per_obspy.tables.risk import FILES, write_design
 
 
 @pytest.fixture

@@ -13,10 +13,10 @@ import pytest
 
 from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.screening.ranking import KEYS, in_order
+from per_obspy.tables import ranked_table as ranked_tables
 from per_obspy.tables import risk
 from per_obspy.tables.parts import write_part
-from per_obspy.tables.ranked import ranked_table as ranked_tables
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.ranked_table import ranked_table
 from per_obspy.tables.risk import write_risk, write_worst
 
 COUNT = 300

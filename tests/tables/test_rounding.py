@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from per_obspy.tables.rounding import rounded, rounded_arrow, rounded_table
+from per_obspy.tables.table_files import rounded, rounded_arrow, rounded_table
 
 TABLE = pd.DataFrame(
     {

@@ -7,7 +7,7 @@ import shapely
 
 from per_obspy.config import Totals
 from per_obspy.tables import totals as tables
-from per_obspy.tables.rounding import rounded_table
+from per_obspy.tables.table_files import rounded_table
 from per_obspy.tables.totals import (
     CountedTotals,
     piece_totals,

@@ -12,7 +12,7 @@ from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.run import run
 from per_obspy.screening.region.totals import hexagons
 from per_obspy.spectra.storage import read_spectra
-from per_obspy.tables.rounding import rounded
+from per_obspy.tables.table_files import rounded
 
 from ..pipeline.small_run import InProcess, plain_reports
 

@@ -7,36 +7,260 @@ machine. Only tasks that fail each time stay undone. The client keeps few tasks 
 client and scheduler does not grow with the number of tasks.
 """
 
+import json
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Future, InvalidStateError
 from contextlib import ExitStack, contextmanager, suppress
+from datetime import UTC, datetime
 from functools import partial
+from importlib import import_module
 from itertools import count
 from pathlib import Path
-from threading import Event, Thread, Timer
+from threading import Event, Lock, Thread, Timer
 from typing import Any
+from urllib.parse import urlsplit
 
-from per_obspy.config.engine import Engine
-from per_obspy.errors import MachineFault, TryLater, printable
+from per_obspy.config.engine import Engine, local_workers
+from per_obspy.errors import (
+    CatalogError,
+    MachineFault,
+    ServiceError,
+    TryLater,
+    printable,
+    reason_of,
+    require_extra,
+)
 from per_obspy.files import remove_file, temporary_folder, writing
-from per_obspy.jobs.cluster.dask_client import connected_client, fit_identities, present_workers
 from per_obspy.jobs.cluster.worker_side import (
     Outcome,
     SentTask,
     Shared,
+    Versions,
     do_sent,
+    identity,
     own_versions,
     sent_task,
     token_file,
     wait_until_idle,
 )
-from per_obspy.jobs.cluster.workers import Workers
 from per_obspy.jobs.parallel import AHEAD, ElasticExecutor
+from per_obspy.threads import usable_processors
+
+#: Seconds within which a scheduler has to answer.
+ANSWER = 30
+
+#: Bytes of a scheduler file that are read: it holds a few addresses, and every worker of later.
+LARGEST_FILE = 10_000_000
+
+
+@contextmanager
+def connected_client(address: str) -> Iterator[Any]:
+    """
+    Yield a client of a cluster, which is started first if it is one of this machine.
+
+    Parameters
+    ----------
+    address : str
+        As :func:`per_obspy.config.engine.checked_address` returns it.
+
+    Raises
+    ------
+    MissingExtra
+        If Dask is not installed.
+    ServiceError
+        If no scheduler answers there.
+    """
+    require_extra("dask", "distributed")
+    library = import_module("distributed")  # its classes have no complete types
+
+    with ExitStack() as stack:
+        place: Any = address
+        if local_workers(address) is not None:
+            place = stack.enter_context(_local_cluster(address))
+        elif address.endswith(".json") and "://" not in address:
+            place = _address_in(Path(address))
+        try:
+            client = library.Client(place, timeout=ANSWER, set_as_default=False)
+        except (OSError, ValueError) as error:
+            reason = printable(str(error)) or type(error).__name__
+            raise ServiceError(f"{address}: no scheduler answers: {reason}") from error
+        yield stack.enter_context(client)
+
+
+def _address_in(file: Path) -> str:
+    """Return the address in a scheduler file; for one that is missing Dask would wait for ever."""
+    try:
+        with file.open("rb") as opened:
+            known = json.loads(opened.read(LARGEST_FILE))
+    except (OSError, ValueError) as error:
+        reason = f"no scheduler file that can be read: {reason_of(error)}"
+        raise ServiceError(f"{file}: {reason}; has the scheduler started?") from error
+    # It also names the workers, which the scheduler knows better
+    address = known.get("address") if isinstance(known, dict) else None
+    if not isinstance(address, str) or "://" not in address:
+        raise CatalogError(str(file), "no scheduler file: it has no address of a scheduler")
+    return address
+
+
+def _local_cluster(address: str) -> Any:
+    """Return a cluster of this machine, one process per worker, closed to other machines."""
+    library = import_module("distributed")  # its classes have no complete types
+
+    # Faults of workers are logged once, by their client
+    return library.LocalCluster(
+        n_workers=local_workers(address) or usable_processors(),
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        silence_logs=logging.CRITICAL,
+    )
+
+
+def present_workers(client: Any) -> Mapping[str, tuple[str, int]]:
+    """Return the workers of a cluster: address -> machine by address, threads."""
+    # ``scheduler_info`` has no workers while the client refreshes it in the background
+    known = client.nthreads()
+    return {
+        str(address): (urlsplit(address).hostname or "unknown", int(threads))
+        for address, threads in known.items()
+    }
+
+
+def fit_identities(client: Any, new: Collection[str]) -> dict[str, tuple[str, Versions] | str]:
+    """
+    Return machine and versions of workers, or why a worker gives no answer.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Of the cluster.
+    new : collection of str
+        Addresses.
+    """
+    if not new:
+        return {}
+    # Without the package a worker cannot even be asked by it
+    packages = client.get_versions(packages=["per_obspy"])["workers"]
+    found: dict[str, tuple[str, Versions] | str] = {}
+    able = []
+    for address in new & packages.keys():
+        if packages[address]["packages"].get("per_obspy") is None:
+            found[address] = "has no per_obspy"
+        else:
+            able.append(address)
+    if able:
+        answers = client.run(identity, workers=able, on_error="return")
+        for address, answer in answers.items():
+            failed = isinstance(answer, BaseException)
+            found[address] = f"cannot be asked: {answer}" if failed else answer
+    return found
+
 
 LOG = logging.getLogger("per_obspy.cluster")
+
+#: Events that are kept; of a cluster that loses workers all day the first ones explain the rest.
+EVENTS_KEPT = 1000
+
+
+class Workers:
+    """
+    Workers by address, with their events.
+
+    Every fault is logged with the worker's machine and address when it happens.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._present: dict[str, int] = {}
+        self._hosts: dict[str, str] = {}
+        self._unfit: dict[str, str] = {}
+        self._work: dict[str, tuple[int, float]] = {}
+        self._events: list[dict[str, str]] = []
+        self._events_left_out = 0
+
+    def update(self, present: Mapping[str, tuple[str, int]]) -> set[str]:
+        """
+        Update the present workers, note those that disappeared, and return new addresses.
+
+        Parameters
+        ----------
+        present : mapping of str to (str, int)
+            Address -> machine, threads.
+        """
+        with self._lock:
+            lost = self._present.keys() - present.keys()
+            new = present.keys() - self._present.keys()
+            self._present = {address: threads for address, (_, threads) in present.items()}
+            for address in new:
+                self._hosts.setdefault(address, present[address][0])
+        # Logging may take its time
+        for address in sorted(lost):
+            self._note(address, "is gone: killed, preempted or cut off; its tasks are done again")
+        return new
+
+    def known_as(self, address: str, host: str) -> None:
+        """Set the machine name of a worker."""
+        self._hosts[address] = host
+
+    def refuse(self, address: str, reason: str) -> None:
+        """Note that a worker is unfit for this run; the same fault is noted once."""
+        with self._lock:
+            known = self._unfit.get(address) == reason
+            self._unfit[address] = reason
+        if not known:
+            self._note(address, f"{reason}; it gets no task")
+
+    def failed(self, address: str, reason: str) -> None:
+        """Note that a task failed for a fault of a worker's machine."""
+        self._note(address, reason)
+
+    def did(self, address: str, host: str, seconds: float) -> None:
+        """Count a finished task of a worker."""
+        with self._lock:
+            self._hosts[address] = host
+            tasks, before = self._work.get(address, (0, 0.0))
+            self._work[address] = (tasks + 1, before + seconds)
+
+    def fit(self) -> dict[str, int]:
+        """Return the fit workers that are present: address -> threads."""
+        with self._lock:
+            return {name: one for name, one in self._present.items() if name not in self._unfit}
+
+    def unfit(self) -> list[str]:
+        """Return the workers that are present and unfit, each with its reason."""
+        with self._lock:
+            present = [name for name in self._present if name in self._unfit]
+            return [f"{self._hosts[name]} ({name}) {self._unfit[name]}" for name in present]
+
+    def facts(self) -> dict[str, Any]:
+        """Return every worker with its work, and all events, as plain values."""
+        with self._lock:
+            # Workers that are gone have done their part as well
+            names = sorted({*self._present, *self._work})
+            rows = [(name, *self._work.get(name, (0, 0.0))) for name in names]
+            workers = [
+                {"address": n, "host": self._hosts[n], "tasks": tasks, "seconds": round(spent, 3)}
+                for n, tasks, spent in rows
+            ]
+            left_out = self._events_left_out
+            return {"workers": workers, "events": [*self._events], "events_left_out": left_out}
+
+    def _note(self, address: str, reason: str) -> None:
+        """Keep and log one event."""
+        host, at = self._hosts.get(address, "unknown"), datetime.now(UTC)
+        event = {"at": at.isoformat(timespec="seconds"), "worker": address, "host": host}
+        # A cluster may lose workers all day
+        with self._lock:
+            if len(self._events) < EVENTS_KEPT:
+                self._events.append({**event, "reason": printable(reason)})
+            else:
+                self._events_left_out += 1
+        LOG.warning("worker %s (%s) %s", host, address, printable(reason))
+
 
 #: Seconds between two looks at the workers, and before a task is tried again (times the attempt).
 LOOK, PAUSE = 1.0, 0.5

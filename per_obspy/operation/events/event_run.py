@@ -31,7 +31,7 @@ from per_obspy.pipeline.run import run
 from per_obspy.records.contents.file_list import files_below
 from per_obspy.records.contents.growing import file_states, growing_files
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations
-from per_obspy.tables.ranked.ranked_files import table_outputs
+from per_obspy.tables.ranked_table import table_outputs
 
 
 class Done(NamedTuple):

@@ -11,7 +11,7 @@ import pyarrow as pa
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import cell
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
-from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked_table import table_files
 
 #: Name of the table in a revision.
 CHANGES = "changes.csv"

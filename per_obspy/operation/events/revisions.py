@@ -22,7 +22,7 @@ from per_obspy.names import inside
 from per_obspy.operation.events.revision_changes import CHANGES, write_changes
 from per_obspy.pipeline.provenance import CONFIGURATION
 from per_obspy.resume import Status, StatusError, read_status, write_status
-from per_obspy.tables.ranked.ranked_files import table_outputs
+from per_obspy.tables.ranked_table import table_outputs
 
 #: Folder of the revisions, link to the newest, and description of each.
 REVISIONS, LATEST, REVISION = "revisions", "latest", "revision.json"

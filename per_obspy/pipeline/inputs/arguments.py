@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.config import Run, checked
-from per_obspy.config.changes import merged, parsed_changes
+from per_obspy.config.commented import merged, parsed_changes
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError, printable
 from per_obspy.pipeline.inputs.input_kinds import (

@@ -13,7 +13,7 @@ from per_obspy.pipeline.inputs.described_tables import ranked_table_facts
 from per_obspy.pipeline.inputs.facts import Facts, Places, some
 from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.resume import StatusError, read_status
-from per_obspy.tables.ranked.ranked_files import listed_outputs, table_files
+from per_obspy.tables.ranked_table import listed_outputs, table_files
 
 #: Keys of a configuration that are listed.
 MOST_KEYS = 12

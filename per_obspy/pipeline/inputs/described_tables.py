@@ -16,7 +16,7 @@ from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
 from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.screening.ranking import EVERY_STATE, STATES
 from per_obspy.tables.parts import parquet_rows
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.ranked_table import ranked_table
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -15,8 +15,7 @@ from per_obspy.pipeline.results.report_files import outlines_beside
 from per_obspy.pipeline.stations import stations_of_earlier_run
 from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
-from per_obspy.tables.ranked.ranked_files import table_files
-from per_obspy.tables.ranked.ranked_table import ROWS
+from per_obspy.tables.ranked_table import ROWS, table_files
 
 #: Columns of a risk table that do not depend on the motion.
 OF_BUILDINGS = (

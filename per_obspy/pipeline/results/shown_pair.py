@@ -11,7 +11,7 @@ from per_obspy.report.pair_figure import draw_pair_alone, draw_record_to_pair
 from per_obspy.resume import StatusError, read_status
 from per_obspy.spectra.storage import read_spectra
 from per_obspy.tables.parts import bounded_database, parquet_rows
-from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked_table import table_files
 
 #: Tables of results that have one row per pair.
 TABLES = ("risk", "design", "ensemble")

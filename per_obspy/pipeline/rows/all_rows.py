@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from per_obspy.config.building_rows import Rows
+from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.inventory.building_rows.contacts import IntArray
 from per_obspy.jobs.building_rows import CHUNK
@@ -27,8 +27,8 @@ from per_obspy.screening.building_rows.placed import ChunkNumbers
 from per_obspy.screening.building_rows.sides import OF_PAIRS
 from per_obspy.tables.building_rows import TOGETHER as GROUP
 from per_obspy.tables.buildings import AREA, one_thread_database, stored_rows
-from per_obspy.tables.described import regrouped
 from per_obspy.tables.parts import batches
+from per_obspy.tables.table_files import regrouped
 
 #: Pairs of a piece, about.
 PIECE = 20_000

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.config import Run
-from per_obspy.config.building_rows import Rows
+from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file, temporary_folder
 from per_obspy.jobs.building_rows import RowsJob, RowsPart, do_row_chunks, rows_rejections
@@ -23,7 +23,7 @@ from per_obspy.pipeline.rows.pair_columns import PairColumns, pair_columns
 from per_obspy.progress import Progress
 from per_obspy.tables.building_rows import write_rows
 from per_obspy.tables.buildings import BuildingWays, write_buildings
-from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked_table import table_files
 from per_obspy.threads import usable_processors
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from per_obspy.config.building_rows import Rows
+from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.inventory.building_rows.chains import Chains, chains_of
 from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray, contacts_of

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pyarrow as pa
 
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.ranked_table import ranked_table
 
 #: Pairs that are read together.
 TOGETHER = 20_000

@@ -1,4 +1,4 @@
-"""Exit codes and lines of ``per_obspy.commands.operation.watch``."""
+"""Exit codes and lines of ``per_obspy.commands.operation``."""
 
 import pytest
 from fdsn_server import content, serving, status

@@ -1,7 +1,7 @@
 """
 Tasks on two worker processes of a Dask cluster: none is lost whatever happens to a worker.
 
-Tests per_obspy.jobs.cluster.dask_client and per_obspy.jobs.cluster.workers as well.
+Tests per_obspy.jobs.cluster.dask_executor and per_obspy.jobs.cluster.dask_executor as well.
 """
 
 import os
@@ -13,8 +13,7 @@ import pytest
 from per_obspy.config.engine import Engine
 from per_obspy.errors import ServiceError, TryLater, Unfinished
 from per_obspy.jobs.cluster import worker_side
-from per_obspy.jobs.cluster.dask_client import present_workers
-from per_obspy.jobs.cluster.dask_executor import DaskExecutor
+from per_obspy.jobs.cluster.dask_executor import DaskExecutor, present_workers
 from per_obspy.jobs.parallel import AHEAD, Work, results
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")

@@ -22,7 +22,7 @@ from per_obspy.pipeline.results.report_files import Report, TableReader, write_f
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.report.results import Region, Results
 from per_obspy.tables.coverage import Coverage
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.ranked_table import ranked_table
 
 from ...report.page.made_up import CLASSES, pair_table
 from ..small_run import page_content

@@ -16,7 +16,7 @@ import pytest
 
 from per_obspy.pipeline.run import report, screen
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
-from per_obspy.tables.rounding import rounded
+from per_obspy.tables.table_files import rounded
 
 from ..small_run import InProcess, write_configuration
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.tables.ranked.cell_names import NO_PLACE, cell_names
+from per_obspy.tables.ranked_cells import NO_PLACE, cell_names
 
 #: Places on edges of cells, around zero, and at the ends of the coordinates.
 PLACES = [(0.0, 0.0), (-1e-9, 0.0), (179.99, 89.99), (-180.0, -90.0), (12.3, -45.6)]

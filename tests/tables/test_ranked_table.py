@@ -7,9 +7,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from per_obspy.errors import CatalogError
-from per_obspy.tables.ranked import ranked_table as module
-from per_obspy.tables.ranked.ranked_files import remove_table, table_files, table_outputs
-from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables import ranked_table as module
+from per_obspy.tables.ranked_table import ranked_table, remove_table, table_files, table_outputs
 
 COUNT = 40
 

@@ -1,1 +1,0 @@
-"""Commands for unattended operation: log options, status and the watcher."""
