@@ -6,8 +6,8 @@ is then arranged for itself. Arranged parts are compressed Arrow files, of which
 is read without the others. The ranks of the rows are in a file next to it, so that the order of
 all rows is known before any of them is read.
 
-When a cell is merged, ranks are read first, some millions at a time; they are the order in which the files
-have the next row. Of each file one batch of rows is in memory.
+When a cell is merged, ranks are read first, some millions at a time; they are the order in which
+the files have the next row. Of each file one batch of rows is in memory.
 """
 
 from collections import Counter
