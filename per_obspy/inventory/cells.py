@@ -17,8 +17,14 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
-from per_obspy.inventory.recognition.units import Unit, unit_of, unit_of_schema
-from per_obspy.inventory.recognition.words import named, plain_word, words
+from per_obspy.inventory.files.words import (
+    Unit,
+    named,
+    plain_word,
+    unit_of,
+    unit_of_schema,
+    words,
+)
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
 #: Column of the texts that were not understood, or are no exact value.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, reason_of
-from per_obspy.inventory.recognition.csv_text import check_separator, check_text
+from per_obspy.inventory.files.text_lines import check_separator, check_text
 
 #: Largest value that a spectrum may have and its unit: larger ones are in other units (ms, per
 #: cent, mm, cm/s2).

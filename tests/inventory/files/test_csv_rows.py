@@ -8,8 +8,8 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from per_obspy.errors import CatalogError
+from per_obspy.inventory.files import text_lines
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk, read_pairs
-from per_obspy.inventory.recognition import csv_text
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note,zone"
 
@@ -112,7 +112,7 @@ def test_a_quotation_mark_among_many_rows_loses_its_own_row_only(tmp_path, posit
 @pytest.mark.parametrize("block", [7, 1 << 20])
 def test_every_line_is_read_rejected_or_blank(tmp_path, monkeypatch, size, ending, block):
     # would catch rows lost at the border of a block inside a quotation, and wrong line numbers
-    monkeypatch.setattr(csv_text, "BLOCK", block)
+    monkeypatch.setattr(text_lines, "BLOCK", block)
     lines = [HEADER]
     good, bad = {}, {}
 
