@@ -165,32 +165,12 @@ class PairFile:
         CatalogError
             If a number may be read in two ways, or a text of a known column may be.
         """
-        is_text, units = self._contents.is_text, self.meanings.units
-        known = {name: COLUMNS[name].dtype for name in self.names if name in COLUMNS}
-        texts = [name for name in known if known[name] == "str" and self._contents.is_doubtful]
-        evidence = {name: Evidence() for name in known if known[name] != "str" and is_text}
-        types = {name: [pa.int64(), pa.float64()] for name in self.names if name not in known}
-        # The gaps may have a unit in each cell
-        is_sought, gap_unit = "gap" in known and "gap" not in units, ""
-        chosen = {*texts, *evidence, *(types if is_text else ()), *(("gap",) if is_sought else ())}
-        names = [name for name in self.names if name in chosen]
-        for rows in self._blocks(names) if names else ():
-            for name, cells in zip(rows.table.column_names, rows.table.columns, strict=True):
-                if name in evidence:
-                    evidence[name].add(cells, rows.lines)
-                elif name in texts:
-                    _check_letters(rows, name)
-                elif name in types:
-                    # Drop every type that a cell contradicts
-                    possible = [
-                        kind for kind in types[name] if _as_numbers(cells, kind) is not None
-                    ]
-                    types[name] = possible
-                if name == "gap" and is_sought and not gap_unit and pa.types.is_string(cells.type):
-                    has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
-                    gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
-        form = CellForm(units, self._marks(evidence), self.meanings.language, gap_unit)
-        return form, types
+        common = _Common(self._contents, self.names)
+        for rows in self._blocks(common.names) if common.names else ():
+            common.add(rows)
+        marks, meanings = self._marks(common.evidence), self.meanings
+        form = CellForm(meanings.units, marks, meanings.language, common.gap_unit)
+        return form, common.types
 
     def _marks(self, evidence: Mapping[str, Evidence]) -> dict[str, str]:
         """Return the decimal mark of each column that has commas."""
@@ -217,14 +197,52 @@ class PairFile:
         return points if numbers is None else numbers
 
 
-def _check_letters(rows: RawRows, name: str) -> None:
-    """Raise CatalogError if a text of a column depends on the code page."""
-    # The first cell with a letter that is another one in Turkey
-    cells = rows.table[name]
-    place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
-    if place >= 0:
-        problem = f"line {rows.lines[place]}: {two_pages(name, cells[place].as_py())}"
-        raise CatalogError(rows.source, problem)
+class _Common:
+    """
+    What the cells of a file have in common.
+
+    Attributes
+    ----------
+    names : list of str
+        Columns that have to be read for it.
+    evidence : dict of str to Evidence
+        Columns of numbers of the schema in a text -> meaning of their commas.
+    types : dict of str to list of DataType
+        Other columns of a text -> types of number that each of their cells can be.
+    gap_unit : str
+        A unit other than m that gaps have in their cells.
+    """
+
+    def __init__(self, contents: Contents, names: Sequence[str]) -> None:
+        is_number = {name: COLUMNS[name].dtype != "str" for name in names if name in COLUMNS}
+        text = names if contents.is_text else ()
+        self.evidence = {name: Evidence() for name in text if is_number.get(name)}
+        self.types = {name: [pa.int64(), pa.float64()] for name in text if name not in COLUMNS}
+        self.gap_unit = ""
+        # Texts only where letters are in doubt, gaps only where the heading has no unit
+        self._texts = [name for name in is_number if contents.is_doubtful and not is_number[name]]
+        self._gap = "" if "gap" in contents.meanings.units else "gap"
+        chosen = {*self.evidence, *self.types, *self._texts, self._gap}
+        self.names = [name for name in names if name in chosen]
+
+    def add(self, rows: RawRows) -> None:
+        """Look at further rows; raise CatalogError for a text that depends on the code page."""
+        for name, cells in zip(rows.table.column_names, rows.table.columns, strict=True):
+            if name in self.evidence:
+                self.evidence[name].add(cells, rows.lines)
+            if name in self.types:
+                # Drop every type that a cell contradicts
+                possible = {kind: _as_numbers(cells, kind) for kind in self.types[name]}
+                self.types[name] = [kind for kind in possible if possible[kind] is not None]
+            if name == self._gap and not self.gap_unit and pa.types.is_string(cells.type):
+                has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
+                self.gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
+            if name in self._texts:
+                # The first cell with a letter that is another one in Turkey
+                place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
+                if place >= 0:
+                    problem = two_pages(name, cells[place].as_py())
+                    raise CatalogError(rows.source, f"line {rows.lines[place]}: {problem}")
 
 
 def _as_numbers(cells: pa.ChunkedArray, kind: pa.DataType) -> pa.ChunkedArray | None:

@@ -48,7 +48,7 @@ def open_parquet(file: Path, given: TableForm) -> Contents:
 def _parquet_rows(file: Path, meanings: Meanings, places: Sequence[int]) -> Iterator[RawRows]:
     """Yield the rows of some columns, with rejections of text that is not UTF-8."""
     columns = [meanings.cells[place] for place in places]
-    names = [meanings.names[place] for place in places]
+    identifier = dict(zip(meanings.names, meanings.cells, strict=True)).get(IDENTIFIER)
     line = 2  # as if the file had a header
     # Relative names such as http:/x are addresses to the reader
     with _readable(file), pa.parquet.ParquetFile(file.absolute(), pre_buffer=False) as stored:
@@ -56,11 +56,10 @@ def _parquet_rows(file: Path, meanings: Meanings, places: Sequence[int]) -> Iter
             table, faults = plain_columns(pa.Table.from_batches([batch]).select(columns))
             broken = []
             for row, fault in faults.items():
-                pair = str(table[names.index(IDENTIFIER)][row]) if IDENTIFIER in names else ""
+                pair = str(table[identifier][row]) if identifier in columns else ""
                 broken.append(Rejection("pair", pair, str(file), line + row, (fault,)))
-            good = np.isin(np.arange(len(table)), list(faults), invert=True)
-            lines = np.arange(line, line + len(table))[good]
-            yield RawRows(str(file), table.filter(pa.array(good)), lines, tuple(broken))
+            good = np.delete(np.arange(len(table)), list(faults))
+            yield RawRows(str(file), table.take(good), line + good, tuple(broken))
             line += len(table)
 
 

@@ -50,7 +50,7 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
     Parameters
     ----------
     path : str, Path or DataFrame
-        ``.csv``, ``.tsv`` or ``.txt``, ``.parquet``, or ``.xlsx``; or a table in memory, whose rows
+        ``.csv``, ``.tsv``, ``.txt``, ``.parquet`` or a workbook; or a table in memory, whose rows
         count as following a header in line 1. Columns, units and allowed ranges are in
         ``per_obspy.inventory.schema.COLUMNS``; further columns are carried through. Text that is
         not plain (UTF-8, commas, the names of the schema) is recognised where it is unambiguous.
@@ -133,6 +133,7 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
 
 def _checked_whole(rows: RawRows, table: pd.DataFrame | None = None) -> pd.DataFrame:
     """Check all rows of a file, or of a table in memory, with suspicions and proposed units."""
+    # The account comes first, as the checks leave rows out
     account = Suspicions()
     repeated = pd.Series(name_hashes(_identifiers(rows.table))).duplicated().to_numpy()
     odd = account.add(rows.source, rows.table, rows.lines, repeated)

@@ -15,7 +15,7 @@ import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import partial
 from itertools import islice
 from operator import attrgetter
 from pathlib import Path
@@ -79,9 +79,6 @@ _UTF_8_LETTER = re.compile(
 _MARKS = {codecs.BOM_UTF8: UTF_8, codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
 _MEND = 'save it as "CSV UTF-8", or give encoding = "cp1254" or the like in [pairs]'
-
-# Text inside quotation marks, in which a doubled mark represents one mark
-_INSIDE = rb'(?:[^"]|"")*+'
 
 
 class TextForm(NamedTuple):
@@ -212,24 +209,28 @@ def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, l
     for number, line in enumerate(lines, 1):
         # A cell with line breaks ends on a later line
         end, text = number, line
-        while (cells := _strict_cells(text, separator)) is None and end < len(lines):
+        cells, fault = _cells(line, separator)
+        while not cells and '"' in line and end < len(lines):
             text, end = f"{text}\n{lines[end]}", end + 1
-            if '"' not in line:
-                break
-        if cells is not None and (number == 1 or len(cells) >= _FEWEST) and cells:
-            yield number, end, [" ".join(cell.split()) for cell in cells], ""
-        elif cells is None and number == 1:
-            is_open = _patterns(separator).opening.fullmatch(line.encode())
-            yield 1, 1, [" ".join(line.split())], OPEN if is_open else AFTER
+            cells, _ = _cells(text, separator)
+        if cells:
+            fault = ""
+        elif fault and number == 1:
+            cells, end = [line], 1
+        if cells and (number == 1 or len(cells) >= _FEWEST):
+            yield number, end, [" ".join(cell.split()) for cell in cells], fault
 
 
-def _strict_cells(text: str, separator: str) -> list[str] | None:
-    """Return the cells of a row, None if its quotation marks are wrong."""
-    lines = text.splitlines(keepends=True)
+def _cells(text: str, separator: str, strict: bool = True) -> tuple[list[str], str]:
+    """Return the cells of a row, and the fault of its quotation marks: none of the cells then."""
+    limit = csv.field_size_limit()
+    csv.field_size_limit(max(limit, len(text)))
     try:
-        return next(csv.reader(lines, delimiter=separator, strict=True), [])
-    except csv.Error:
-        return None
+        return next(csv.reader([text], delimiter=separator, strict=strict), []), ""
+    except csv.Error as error:
+        return [], OPEN if "unexpected end" in str(error) else AFTER
+    finally:
+        csv.field_size_limit(limit)
 
 
 def check_separator(file: Path, names: list[str]) -> None:
@@ -310,6 +311,7 @@ def _configured(file: Path, given: str) -> str:
         name = codecs.lookup(given).name
     except (LookupError, ValueError):
         name = ""
+    # Texts only: other codecs are programs
     encodings = {codecs.lookup(encoding).name: encoding for encoding in NAMED}
     if name not in encodings:
         meant = did_you_mean(given, NAMED)
@@ -402,82 +404,49 @@ def _undecodable(file: Path) -> str:
 def _text_rows(file: Path, form: TextForm, places: Sequence[int]) -> Iterator[RawRows]:
     """Yield the cells of some columns, some thousands of rows at a time, and the broken lines."""
     # Columns by their position, as names may be anything
-    columns = [str(place) for place in range(len(form.meanings.cells))]
     chosen = [str(place) for place in places]
     options = pa.csv.ConvertOptions(
         column_types=dict.fromkeys(chosen, pa.string()), include_columns=chosen
     )
     empty = pa.table([pa.array([], pa.string())] * len(chosen), names=chosen)
     for rows in row_lines(file, form):
-        broken, skipped = list(rows.broken), list[int]()
-        table = empty
-        if rows.text:
-            table, invalid = _parsed(rows.text, columns, options, form.separator)
-            for row in invalid:
-                reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
-                name = row.text.split(form.separator)[0][:LONGEST_NAME]
-                line = int(rows.numbers[row.number - 1])
-                broken.append(Rejection("pair", name, str(file), line, (reason,)))
-                skipped.append(row.number - 1)
-        lines = np.delete(rows.numbers, skipped)
+        invalid: dict[int, Rejection] = {}
+        table = _parsed(file, form, rows, options, invalid) if rows.text else empty
+        lines = np.delete(rows.numbers, list(invalid))
         # Every line that was given is a row or a broken one
         if len(table) != lines.size:
             problem = f"line {rows.numbers[0]} and the next ones make no rows"
             raise CatalogError(str(file), problem)
-        yield RawRows(str(file), table, lines, tuple(sorted(broken, key=attrgetter("row"))))
+        broken = sorted((*rows.broken, *invalid.values()), key=attrgetter("row"))
+        yield RawRows(str(file), table, lines, tuple(broken))
 
 
 def _parsed(
-    text: bytes, columns: list[str], options: pa.csv.ConvertOptions, separator: str
-) -> tuple[pa.Table, list[pa.csv.InvalidRow]]:
-    """Return rows as a table of text, and those with too few or too many cells."""
-    invalid: list[pa.csv.InvalidRow] = []
+    file: Path,
+    form: TextForm,
+    rows: "RowLines",
+    options: pa.csv.ConvertOptions,
+    invalid: dict[int, Rejection],
+) -> pa.Table:
+    """Return rows as a table of text; add those with too few or too many cells by position."""
 
     def skip(row: pa.csv.InvalidRow) -> str:
-        invalid.append(row)
+        fault = f"{row.actual_columns} columns, the header has {row.expected_columns}"
+        name, line = row.text.split(form.separator)[0], int(rows.numbers[row.number - 1])
+        rejection = Rejection("pair", name[:LONGEST_NAME], str(file), line, (fault,))
+        invalid[row.number - 1] = rejection
         return "skip"
 
     # With threads, the reader does not number the rows; a block is read in one piece
-    reading = pa.csv.ReadOptions(use_threads=False, column_names=columns, block_size=len(text) + 1)
+    columns = [str(place) for place in range(len(form.meanings.cells))]
+    reading = pa.csv.ReadOptions(
+        use_threads=False, column_names=columns, block_size=len(rows.text) + 1
+    )
+    # Blank lines are rows here, so that all are counted
     parsing = pa.csv.ParseOptions(
-        delimiter=separator, ignore_empty_lines=False, invalid_row_handler=skip
+        delimiter=form.separator, ignore_empty_lines=False, invalid_row_handler=skip
     )
-    return pa.csv.read_csv(pa.BufferReader(text), reading, parsing, options), invalid
-
-
-class _Patterns(NamedTuple):
-    """
-    Lines by their quotations.
-
-    Attributes
-    ----------
-    whole, opening : Pattern
-        A line whose quotations are all closed, and one whose last cell is not.
-    closing, between : Pattern
-        A further line of a quotation, which closes it; or which does not, or opens the next one.
-    """
-
-    whole: re.Pattern[bytes]
-    opening: re.Pattern[bytes]
-    closing: re.Pattern[bytes]
-    between: re.Pattern[bytes]
-
-
-@cache
-def _patterns(separator: str) -> _Patterns:
-    """Return the patterns of lines whose cells are separated by a sign."""
-    sign = re.escape(separator).encode()
-    # Cells, and the characters that may follow them
-    cell = rb'(?:"%b"|[^"%b][^%b]*+|)' % (_INSIDE, sign, sign)
-    cells = rb"(?:%b%b)*+" % (sign, cell)
-    # Before a further quotation the last of them is given back
-    some = rb"(?:%b%b)*" % (sign, cell)
-    return _Patterns(
-        whole=re.compile(rb"%b%b" % (cell, cells)),
-        opening=re.compile(rb'(?:%b%b)*+"%b' % (cell, sign, _INSIDE)),
-        closing=re.compile(rb'%b"%b' % (_INSIDE, cells)),
-        between=re.compile(rb'%b(?:"%b%b"%b)?+' % (_INSIDE, some, sign, _INSIDE)),
-    )
+    return pa.csv.read_csv(pa.BufferReader(rows.text), reading, parsing, options)
 
 
 class RowLines(NamedTuple):
@@ -556,7 +525,6 @@ class _Scanner:
     def __init__(self, file: Path, form: TextForm) -> None:
         self.number = form.header_end + 1
         self._file, self._separator = file, form.separator
-        self._patterns = _patterns(form.separator)
         # Lines of a row that goes on in the next block
         self._waiting: deque[bytes] = deque()
         names = [name.strip() for name in form.meanings.names]
@@ -575,31 +543,36 @@ class _Scanner:
             count, fault = row
             lines = [self._waiting.popleft() for _ in range(count)]
             if fault:
-                name = lines[0].partition(self._separator.encode())[0].strip(b'" ')[:LONGEST_NAME]
-                text = name.decode("utf-8", "replace")
-                broken.append(Rejection("pair", text, str(self._file), self.number, (fault,)))
+                broken.append(self._rejection(lines[0], fault))
             else:
                 rows.append(b" ".join(lines) + b"\n")
                 numbers.append(self.number)
             self.number += count
         return RowLines(b"".join(rows), np.array(numbers, dtype=np.int64), tuple(broken))
 
+    def _rejection(self, line: bytes, fault: str) -> Rejection:
+        """Return the rejection of the next line."""
+        name = line.partition(self._separator.encode())[0].strip(b'" ')[:LONGEST_NAME]
+        text = name.decode("utf-8", "replace")
+        return Rejection("pair", text, str(self._file), self.number, (fault,))
+
     def _next(self, is_last: bool) -> tuple[int, str] | None:
         """Return the number of lines of the next row and its fault; None if more are needed."""
         if not self._waiting:
             return None
+        # A row on one line, or a fault on it
         first = self._waiting[0]
-        if b'"' not in first or self._patterns.whole.fullmatch(first):
-            return 1, ""
-        if not self._patterns.opening.fullmatch(first):
-            return 1, AFTER
+        fault = self._cells(first)[1] if b'"' in first else ""
+        if fault != OPEN:
+            return 1, fault
         # Go on to the line that closes the quotation
         for count, line in enumerate(islice(self._waiting, 1, LONGEST_ROW), start=2):
-            if self._patterns.closing.fullmatch(line):
-                cells = self._cells(b"\n".join(islice(self._waiting, count)))
+            _, rest = self._cells(b'"' + line)
+            if not rest:
+                cells, _ = self._cells(b"\n".join(islice(self._waiting, count)))
                 is_row = len(cells) == self._width and not self._begins_again(first, line)
                 return (count, "") if is_row else (1, OPEN)
-            if self._begins_again(first, line) or not self._patterns.between.fullmatch(line):
+            if rest == AFTER or self._begins_again(first, line):
                 return 1, OPEN
         return (1, OPEN) if is_last or len(self._waiting) >= LONGEST_ROW else None
 
@@ -611,14 +584,10 @@ class _Scanner:
         if not (has_all or b'"' not in line) or line.count(sign) < self._width - 1:
             return False
         # A gap that is a number, with either decimal mark, or a word, but no text
-        cells = self._cells(line)
+        cells, _ = self._cells(line, strict=False)
         gap = cells[self._gap] if self._gap < len(cells) else "no row"
         return is_unknown(gap) or not np.isnan(read_number("gap", gap.replace(",", ".")).number)
 
-    def _cells(self, row: bytes) -> list[str]:
-        """Return the cells of a row; none if one of them is longer than any cell should be."""
-        text = row.decode("utf-8", "replace")
-        try:
-            return next(csv.reader([text], delimiter=self._separator), [])
-        except csv.Error:
-            return []
+    def _cells(self, row: bytes, strict: bool = True) -> tuple[list[str], str]:
+        """Return the cells of a row, and the fault of its quotation marks."""
+        return _cells(row.decode("utf-8", "replace"), self._separator, strict)

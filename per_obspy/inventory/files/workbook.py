@@ -107,11 +107,13 @@ def open_workbook(file: Path, given: TableForm) -> Contents:
     except BeyondLimits as error:
         problem = f"not a readable workbook ({file.suffix}): {error}"
         raise CatalogError(str(file), problem) from error
+    # Columns as far as the header has any, rows below it
     sheet = _pair_sheet(file, sheets, given)
     source = f"{file}, sheet {sheet.name!r}"
     meanings = meanings_of(sheet.meanings.cells, given, source)
     rows = sheets[sheet.name].slice(sheet.header, MOST_ROWS).select(range(len(meanings.cells)))
     rows = _computed(source, rows, sheet.header + 1, meanings)
+    # The sheet is named in messages
     header = f" with the header in row {sheet.header}" if sheet.header > 1 else ""
     return Contents(
         source=source,
@@ -124,6 +126,7 @@ def open_workbook(file: Path, given: TableForm) -> Contents:
 
 def _computed(source: str, rows: pa.Table, first: int, meanings: Meanings) -> pa.Table:
     """Return the rows of a sheet; raise CatalogError for a known cell that was never computed."""
+    # Formulas matter in known columns, others are empty
     uncomputed = []
     for place in range(rows.num_columns):
         is_odd = pc.equal(rows[place], _UNCOMPUTED)
@@ -187,27 +190,25 @@ def _read_sheets(file: Path) -> dict[str, pa.Table]:
     """Return the sheets of a workbook, each cell as text."""
     import python_calamine
 
-    kind = looks_like(file)
+    kind, worksheet = looks_like(file), python_calamine.SheetTypeEnum.WorkSheet
     try:
+        # Only packed workbooks have parts
         odd = {} if "old Excel" in kind else _check_parts(file)
         with python_calamine.load_workbook(file) as book:
-            worksheet = python_calamine.SheetTypeEnum.WorkSheet
             names = [sheet.name for sheet in book.sheets_metadata if sheet.typ == worksheet]
             if len(names) > MOST_SHEETS:
-                problem = f"{len(names)} sheets, at most {MOST_SHEETS} are read"
-                raise CatalogError(str(file), problem)
+                raise ValueError(f"{len(names)} sheets, at most {MOST_SHEETS} are read")
             return {
                 name: _as_text(book.get_sheet_by_name(name), odd.get(name, {})) for name in names
             }
     except CatalogError:  # a ValueError as well
         raise
     except (*_DAMAGES, python_calamine.CalamineError) as error:
+        reason = shortened(f"{type(error).__name__} {error}", 200)
+        problem = f"not a readable workbook ({file.suffix}): {reason}"
         if kind and "ZIP" not in kind:
             hint = ", or one with a password" if "old Excel" in kind else ""
             problem = f"not a workbook ({file.suffix}): it is {kind}{hint}"
-        else:
-            reason = shortened(f"{type(error).__name__} {error}", 200)
-            problem = f"not a readable workbook ({file.suffix}): {reason}"
         raise CatalogError(str(file), problem) from error
 
 
@@ -221,6 +222,7 @@ def _check_parts(file: Path) -> dict[str, _OddCells]:
         If they are larger than the limits, or have a document type.
     """
     with zipfile.ZipFile(file) as archive:
+        # Sizes by the directory of the archive
         parts = archive.infolist()
         size = sum(part.file_size for part in parts)
         if size > LARGEST:
@@ -228,18 +230,7 @@ def _check_parts(file: Path) -> dict[str, _OddCells]:
             raise CatalogError(str(file), problem)
         for part in parts:
             _check_part(file, archive, part)
-        if "xl/workbook.xml" not in archive.namelist():
-            return {}
-        # Sheets may have parts of any name
-        relations = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
-        targets = {relation.get("Id"): relation.get("Target", "") for relation in relations}
-        odd = {}
-        for sheet in ElementTree.fromstring(archive.read("xl/workbook.xml")).findall(".//{*}sheet"):
-            key = next(value for name, value in sheet.attrib.items() if name.endswith("}id"))
-            name = posixpath.normpath(posixpath.join("/xl", targets[key]))[1:]
-            with archive.open(name) as stream:
-                odd[sheet.get("name", "")] = _odd_cells(stream)
-        return odd
+        return _odd_cells(archive) if "xl/workbook.xml" in archive.namelist() else {}
 
 
 def _check_part(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
@@ -259,8 +250,22 @@ def _check_part(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> 
         raise CatalogError(str(file), f"{part.filename} has a document type or zero bytes")
 
 
-def _odd_cells(stream: IO[bytes]) -> _OddCells:
-    """Return the cells that the library takes for empty: errors, and formulas without a value."""
+def _odd_cells(archive: zipfile.ZipFile) -> dict[str, _OddCells]:
+    """Return sheet -> cells that the library takes for empty."""
+    # Sheets may have parts of any name
+    relations = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
+    targets = {relation.get("Id"): relation.get("Target", "") for relation in relations}
+    odd = {}
+    for sheet in ElementTree.fromstring(archive.read("xl/workbook.xml")).findall(".//{*}sheet"):
+        key = next(value for name, value in sheet.attrib.items() if name.endswith("}id"))
+        part = posixpath.normpath(posixpath.join("/xl", targets[key]))[1:]
+        with archive.open(part) as stream:
+            odd[sheet.get("name", "")] = _odd_cells_of(stream)
+    return odd
+
+
+def _odd_cells_of(stream: IO[bytes]) -> _OddCells:
+    """Return errors, and formulas without a value, in the XML of a sheet."""
     odd, rest = defaultdict[int, dict[int, str]](dict), b""
     while block := stream.read(1 << 20):
         # Whole cells
@@ -286,26 +291,29 @@ def _column(letters: bytes) -> int:
 
 def _as_text(sheet: Any, odd: _OddCells) -> pa.Table:
     """Return the rows of a sheet from the first one, cells as text, with those of odd cells."""
-    height, width = (end + 1 for end in sheet.end or (-1, -1))
-    height = max([height, *(row + 1 for row in odd)])
-    width = max([width, *(max(cells) + 1 for cells in odd.values())])
+    # Odd cells may be below and behind all others
+    height, width = sheet.end or (-1, -1)
+    height, width = max(height, *odd, -1) + 1, max(width, *chain(*odd.values()), -1) + 1
+    names = [str(place) for place in range(min(width, MOST_COLUMNS))]
+    tables = [pa.table(dict.fromkeys(names, pa.array([], pa.string())))]
+    # Some thousands of rows at a time
+    rows = islice(_rows(sheet, odd, width), height)
+    while block := list(islice(rows, _BLOCK)):
+        columns = map(pa.array, zip(*block, strict=True))
+        tables.append(pa.table(dict(zip(names, columns, strict=False))))
+    return pa.concat_tables(tables)
+
+
+def _rows(sheet: Any, odd: _OddCells, width: int) -> Iterator[list[str]]:
+    """Yield the rows of a sheet, and blank ones without end."""
     # The library leaves out empty columns before the first one
     left = [""] * (sheet.start[1] if sheet.start else 0)
-    rows = enumerate(islice(chain(sheet.iter_rows(), repeat([])), height))
-    names = [str(place) for place in range(min(width, MOST_COLUMNS))]
-    tables = [pa.table([pa.array([], pa.string())] * len(names), names=names)]
-    # Some thousands of rows at a time
-    while block := list(islice(rows, _BLOCK)):
-        table = []
-        for number, row in block:
-            cells = [*left, *map(_text, row)]
-            cells += [""] * (width - len(cells))
-            for place, text in odd.get(number, {}).items():
-                cells[place] = text
-            table.append(cells[:MOST_COLUMNS])
-        columns = [pa.array(column, pa.string()) for column in zip(*table, strict=True)]
-        tables.append(pa.table(columns, names=names))
-    return pa.concat_tables(tables)
+    for number, row in enumerate(chain(sheet.iter_rows(), repeat([]))):
+        cells = [*left, *map(_text, row)]
+        cells += [""] * (width - len(cells))
+        for place, text in odd.get(number, {}).items():
+            cells[place] = text
+        yield cells
 
 
 def _text(value: object) -> str:
