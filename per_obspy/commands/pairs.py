@@ -139,7 +139,7 @@ def _print_footprint_pairs(
 
 @pairs.command("check")
 def check_pairs(
-    file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx, .ods.")],
+    file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx.")],
     write: Annotated[
         bool,
         typer.Option("--write", help="Write names and units of its columns to FILE.toml."),
