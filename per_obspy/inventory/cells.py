@@ -70,25 +70,16 @@ _FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000:
 
 
 class CellForm(NamedTuple):
-    """
-    How the cells of a table are written.
+    """How the cells of a table are written."""
 
-    Attributes
-    ----------
-    units : mapping of str to Unit
-        Column -> unit of its numbers without one, where that is not the schema's.
-    marks : mapping of str to str
-        Column -> its decimal mark, where the column has commas.
-    language : str
-        Of the headings, empty if they are English or of none.
-    gap_unit : str
-        A unit other than m that cells of the gaps have, where their heading has none: a number
-        without a unit is then in doubt.
-    """
-
+    #: Column -> unit of its numbers without one, where that is not the schema's.
     units: Mapping[str, Unit] = {}
+    #: Column -> its decimal mark, where the column has commas.
     marks: Mapping[str, str] = {}
+    #: Of the headings, empty if they are English or of none.
     language: str = ""
+    #: A unit other than m that cells of the gaps have, where their heading has none: a number
+    #: without a unit is then in doubt.
     gap_unit: str = ""
 
 
@@ -97,45 +88,28 @@ PLAIN_CELLS = CellForm()
 
 
 class Value(NamedTuple):
-    """
-    Meaning of one text.
+    """Meaning of one text."""
 
-    Attributes
-    ----------
-    number : float
-        In the unit of the schema, NaN if it is unknown.
-    deviation : float
-        Standard deviation of a gap that is no exact one, 0 else.
-    note : str
-        What is wrong or special about the text, empty if nothing is.
-    is_placeholder : bool
-        Whether it is a number that means nothing.
-    """
-
+    #: In the unit of the schema, NaN if it is unknown.
     number: float
+    #: Standard deviation of a gap that is no exact one, 0 else.
     deviation: float = 0.0
+    #: What is wrong or special about the text, empty if nothing is.
     note: str = ""
+    #: Whether it is a number that means nothing.
     is_placeholder: bool = False
 
 
 class Numbers(NamedTuple):
-    """
-    A column of numbers.
+    """A column of numbers."""
 
-    Attributes
-    ----------
-    values, deviations : (n,) ndarray
-        In the unit of the schema; NaN where a cell is empty, unknown or not understood; deviations
-        are 0 where a value is exact.
-    notes : dict of int to str
-        Position of a row -> what is wrong or special about its cell.
-    placeholders : dict of int to float
-        Position of a row -> number in the unit of the schema that means nothing.
-    """
-
+    #: In the unit of the schema; NaN where a cell is empty, unknown or not understood; deviations
+    #: are 0 where a value is exact. Shape (n,).
     values: FloatArray
     deviations: FloatArray
+    #: Position of a row -> what is wrong or special about its cell.
     notes: dict[int, str]
+    #: Position of a row -> number in the unit of the schema that means nothing.
     placeholders: dict[int, float]
 
 

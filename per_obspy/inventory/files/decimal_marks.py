@@ -8,8 +8,10 @@ thousands; ``1,234`` may be either, so that another number of the table has to d
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 #: Signs between thousands other than comma and point: blanks and apostrophes.
 _GROUPS = "[ '’\u00a0\u202f]"
@@ -41,24 +43,16 @@ _WITH_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?\s*$"
 
 @dataclass
 class Evidence:
-    """
-    Evidence in the numbers of a column about the meaning of their commas.
+    """Evidence in the numbers of a column about the meaning of their commas."""
 
-    Attributes
-    ----------
-    decimal, thousands, point : bool
-        Whether a comma is a decimal mark, commas are between thousands, or a mark can only be a
-        decimal point.
-    example : str
-        The first cell whose comma may be either; empty without one.
-    line : int
-        Its line in the file.
-    """
-
+    #: Whether a comma is a decimal mark, commas are between thousands, or a mark can only be a
+    #: decimal point.
     decimal: bool = False
     thousands: bool = False
     point: bool = False
+    #: The first cell whose comma may be either; empty without one.
     example: str = ""
+    #: Its line in the file.
     line: int = 0
 
     @property
@@ -66,7 +60,7 @@ class Evidence:
         """Whether a number has a comma."""
         return self.decimal or self.thousands or self.example != ""
 
-    def add(self, cells: pa.ChunkedArray, lines: Sequence[int]) -> None:
+    def add(self, cells: pa.ChunkedArray, lines: Sequence[int] | NDArray[np.int64]) -> None:
         """Add the evidence of further cells, of the lines of a file."""
         commas = cells.filter(pc.match_substring(cells, ","))
         self.decimal = self.decimal or _any(commas, _DECIMAL)

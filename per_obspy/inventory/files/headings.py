@@ -37,44 +37,27 @@ _LETTERS = {"a": 1, "b": 2}
 
 
 class Heading(NamedTuple):
-    """
-    Meaning of a heading.
+    """Meaning of a heading."""
 
-    Attributes
-    ----------
-    column : str
-        Name of the schema.
-    unit : Unit or None
-        That of the heading, if it has one.
-    language : str
-        Of the word: ``"en"``, ``"es"``, ...; empty for names of the schema and words of several
-        languages.
-    is_sure : bool
-        Whether the word has no other meaning in a pair table.
-    """
-
+    #: Name of the schema.
     column: str
+    #: That of the heading, if it has one.
     unit: Unit | None = None
+    #: Of the word: ``"en"``, ``"es"``, ...; empty for names of the schema and words of several
+    #: languages.
     language: str = ""
+    #: Whether the word has no other meaning in a pair table.
     is_sure: bool = True
 
 
 class Meanings(NamedTuple):
-    """
-    Columns of the schema in a table.
+    """Columns of the schema in a table."""
 
-    Attributes
-    ----------
-    cells : tuple of str
-        The header.
-    columns : dict
-        Position in the header -> meaning of the column.
-    units : dict
-        Column of the schema -> its unit, where it is configured or in the heading.
-    """
-
+    #: The header.
     cells: tuple[str, ...]
+    #: Position in the header -> meaning of the column.
     columns: dict[int, Heading]
+    #: Column of the schema -> its unit, where it is configured or in the heading.
     units: dict[str, Unit]
 
     @property

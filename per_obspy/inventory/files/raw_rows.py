@@ -14,60 +14,38 @@ from per_obspy.inventory.files.headings import Meanings
 
 
 class RawRows(NamedTuple):
-    """
-    Consecutive rows of a file before any check.
+    """Consecutive rows of a file before any check."""
 
-    Attributes
-    ----------
-    source : str
-        The file.
-    table : Table
-        Numbers in the units of the schema, null where a cell is empty or not understood, with what
-        is said of such cells in ``cell_notes``; text as it is.
-    lines : (n_rows,) ndarray of int
-        Line of each row in its file; the header is line 1.
-    broken : tuple of Rejection
-        Lines between the rows that are no rows.
-    """
-
+    #: The file.
     source: str
+    #: Numbers in the units of the schema, null where a cell is empty or not understood, with what
+    #: is said of such cells in ``cell_notes``; text as it is.
     table: pa.Table
+    #: Line of each row in its file; the header is line 1. Shape (n_rows,).
     lines: NDArray[np.int64]
+    #: Lines between the rows that are no rows.
     broken: tuple[Rejection, ...]
 
 
 class Contents(NamedTuple):
-    """
-    A table as its file has it.
+    """A table as its file has it."""
 
-    Attributes
-    ----------
-    source : str
-        The file, with the sheet of a workbook.
-    meanings : Meanings
-        Of its header.
-    names : list of str
-        Of its columns, by the schema where it knows them; empty for a column without a name.
-    blocks : callable
-        ``blocks(places)`` yields these columns, named by their place, with the broken lines: every
-        line of the file is in one of the rows, broken or blank.
-    form : tuple of str
-        How the file is written, where that is not plain.
-    is_text : bool
-        Whether every cell is text, so that numbers in it have to be recognised.
-    separator : str
-        Between the cells of a text.
-    is_doubtful : bool
-        Whether another encoding would give other letters, and no heading decides.
-    """
-
+    #: The file, with the sheet of a workbook.
     source: str
+    #: Of its header.
     meanings: Meanings
+    #: Of its columns, by the schema where it knows them; empty for a column without a name.
     names: list[str]
+    #: ``blocks(places)`` yields these columns, named by their place, with the broken lines: every
+    #: line of the file is in one of the rows, broken or blank.
     blocks: Callable[[Sequence[int]], Iterator[RawRows]]
+    #: How the file is written, where that is not plain.
     form: tuple[str, ...] = ()
+    #: Whether every cell is text, so that numbers in it have to be recognised.
     is_text: bool = True
+    #: Between the cells of a text.
     separator: str = ""
+    #: Whether another encoding would give other letters, and no heading decides.
     is_doubtful: bool = False
 
 

@@ -25,21 +25,13 @@ ALL = 1 << 40
 
 
 class PairChunk(NamedTuple):
-    """
-    Consecutive rows of an inventory, not checked yet.
+    """Consecutive rows of an inventory, not checked yet."""
 
-    Attributes
-    ----------
-    rows : RawRows
-        Before any check.
-    repeated : (n_rows,) ndarray of bool
-        Whether an earlier row of the inventory has the row's ``pair_id``.
-    odd : (n_rows,) ndarray of object
-        Names of each row's suspicions, see :mod:`per_obspy.inventory.suspicions`.
-    """
-
+    #: Before any check.
     rows: RawRows
+    #: Whether an earlier row of the inventory has the row's ``pair_id``. Shape (n_rows,).
     repeated: NDArray[np.bool_]
+    #: Names of each row's suspicions, see :mod:`per_obspy.inventory.suspicions`. Shape (n_rows,).
     odd: NDArray[np.object_]
 
 

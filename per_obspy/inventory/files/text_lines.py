@@ -82,29 +82,19 @@ _MEND = 'save it as "CSV UTF-8", or give encoding = "cp1254" or the like in [pai
 
 
 class TextForm(NamedTuple):
-    """
-    Form of a text table.
+    """Form of a text table."""
 
-    Attributes
-    ----------
-    encoding, separator : str
-        Of the text.
-    header, header_end : int
-        First and last line of the header, whose cells may have line breaks.
-    meanings : Meanings
-        Of its cells.
-    fault : str
-        What is wrong with its quotation marks.
-    lines : int
-        Number of lines of the file.
-    """
-
+    #: Of the text.
     encoding: str
     separator: str
+    #: First and last line of the header, whose cells may have line breaks.
     header: int
     header_end: int
+    #: Of its cells.
     meanings: Meanings
+    #: What is wrong with its quotation marks.
     fault: str = ""
+    #: Number of lines of the file.
     lines: int = 0
 
 
@@ -450,21 +440,13 @@ def _parsed(
 
 
 class RowLines(NamedTuple):
-    """
-    Consecutive rows of a text table.
+    """Consecutive rows of a text table."""
 
-    Attributes
-    ----------
-    text : bytes
-        One line per row; line breaks inside of cells have become blanks.
-    numbers : (n_rows,) ndarray of int
-        Line of the file on which each row begins; the header is line 1.
-    broken : tuple of Rejection
-        Lines between the rows whose quotation marks are wrong.
-    """
-
+    #: One line per row; line breaks inside of cells have become blanks.
     text: bytes
+    #: Line of the file on which each row begins; the header is line 1. Shape (n_rows,).
     numbers: NDArray[np.int64]
+    #: Lines between the rows whose quotation marks are wrong.
     broken: tuple[Rejection, ...]
 
 

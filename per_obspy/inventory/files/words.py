@@ -94,18 +94,11 @@ def named(kind: str) -> Mapping[str, str]:
 
 
 class Unit(NamedTuple):
-    """
-    A unit as numerator and denominator of its factor, so that 7 cm are exactly 0.07 m.
+    """A unit as numerator and denominator of its factor, so that 7 cm are exactly 0.07 m."""
 
-    Attributes
-    ----------
-    name : str
-        As it is written.
-    numerator, denominator : float
-        ``value * numerator / denominator`` is in the unit of the schema.
-    """
-
+    #: As it is written.
     name: str
+    #: ``value * numerator / denominator`` is in the unit of the schema.
     numerator: float
     denominator: float
 

@@ -14,7 +14,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, datetime, time
-from functools import partial
+from functools import partial, reduce
 from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -71,21 +71,13 @@ _DAMAGES = (
 
 
 class _Sheet(NamedTuple):
-    """
-    A sheet with the row of its header and the meanings of its columns.
+    """A sheet with the row of its header and the meanings of its columns."""
 
-    Attributes
-    ----------
-    name : str
-        In the workbook.
-    header : int
-        Row, from 1.
-    meanings : Meanings
-        Of its cells.
-    """
-
+    #: In the workbook.
     name: str
+    #: Row, from 1.
     header: int
+    #: Of its cells.
     meanings: Meanings
 
 
@@ -277,16 +269,9 @@ def _odd_cells_of(stream: IO[bytes]) -> _OddCells:
             is_uncomputed = formula and not error and b't="str"' not in attributes
             if place and int(place[2]) <= MOST_ROWS and (is_error or is_uncomputed):
                 value = error.decode("utf-8", "replace") if is_error else _UNCOMPUTED
-                odd[int(place[2]) - 1][_column(place[1])] = value
+                column = reduce(lambda number, letter: 26 * number + letter - 64, place[1], 0)
+                odd[int(place[2]) - 1][column - 1] = value
     return odd
-
-
-def _column(letters: bytes) -> int:
-    """Return the place of a column, from 0."""
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - ord("A") + 1
-    return number - 1
 
 
 def _as_text(sheet: Any, odd: _OddCells) -> pa.Table:
@@ -325,5 +310,6 @@ def _text(value: object) -> str:
             raise ValueError("a number has too many digits")
         return str(int(value)) if value.is_integer() and abs(value) < 1e16 else repr(value)
     # Days have a time of day, as those with one
-    is_day = isinstance(value, date) and not isinstance(value, datetime)
-    return str(datetime.combine(value, time())) if is_day else str(value)
+    if isinstance(value, date) and not isinstance(value, datetime):
+        return str(datetime.combine(value, time()))
+    return str(value)
