@@ -338,8 +338,9 @@ def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
         if number is not None and number >= 0.0:
             if kind == "above":
                 return _noted(name, text, number, 0.0, "the least it may be")
-            low, high = (1.0 - ABOUT, 1.0 + ABOUT) if kind == "about" else (0.0, 1.0)
-            return _even(name, text, low * number, high * number)
+            if kind == "about":
+                return _even(name, text, number * (1.0 - ABOUT), number * (1.0 + ABOUT))
+            return _even(name, text, 0.0, number)
     # A number with a deviation, or between two
     for kind, first, second in _splits(word):
         ends = _both(name, first, second, form)
