@@ -44,8 +44,8 @@ LONGEST_ROW = 100
 #: Longest line, bytes, and longest name of a row in messages.
 LONGEST_LINE, LONGEST_NAME = 8 << 20, 80
 
-#: Lines among which the header is sought, in so many bytes: titles and blank lines may precede it.
-HEADER_LINES, _HEAD = 20, 1 << 18
+#: Lines among which the header is sought: titles and blank lines may precede it.
+HEADER_LINES = 20
 
 #: Headings that must mean a column for a line below the first to be the header.
 _FEWEST = 3
@@ -96,6 +96,8 @@ class TextForm(NamedTuple):
     fault: str = ""
     #: Number of lines of the file.
     lines: int = 0
+    #: Whether another encoding would give other letters, and no heading decides.
+    is_doubtful: bool = False
 
 
 def open_text(file: Path, given: TableForm) -> Contents:
@@ -107,7 +109,7 @@ def open_text(file: Path, given: TableForm) -> Contents:
     CatalogError
         If it is no text in any encoding that is known, or a column given for it is not there.
     """
-    form, is_doubtful = text_form(file, given)
+    form = text_form(file, given)
     meanings = form.meanings
     # Only differences from a plain table
     texts = [f"text in {form.encoding}"] if form.encoding not in (UTF_8, "ascii") else []
@@ -122,13 +124,13 @@ def open_text(file: Path, given: TableForm) -> Contents:
         blocks=partial(_text_rows, file, form),
         form=tuple(texts),
         separator=form.separator,
-        is_doubtful=is_doubtful,
+        is_doubtful=form.is_doubtful,
     )
 
 
-def text_form(file: Path, given: TableForm) -> tuple[TextForm, bool]:
+def text_form(file: Path, given: TableForm) -> TextForm:
     """
-    Return the form of a text table, and whether its letters depend on the code page.
+    Return the form of a text table.
 
     Raises
     ------
@@ -151,7 +153,8 @@ def text_form(file: Path, given: TableForm) -> tuple[TextForm, bool]:
     if best.fault:
         raise CatalogError(str(file), f"line {best.header}: {best.fault}")
     is_western = best.encoding == WESTERN and TURKISH_PAGE in encodings
-    return best._replace(meanings=meanings, lines=lines), is_western and not meanings.language
+    is_doubtful = is_western and not meanings.language
+    return best._replace(meanings=meanings, lines=lines, is_doubtful=is_doubtful)
 
 
 def _rank(form: TextForm) -> tuple[bool, int, bool]:
@@ -183,15 +186,11 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
 
 def _first_lines(file: Path, encoding: str) -> list[str]:
     """Return the first lines of a file."""
-    head = b""
     try:
-        for block in text_blocks(file, encoding):
-            head += block
-            if len(head) >= _HEAD:
-                break
+        block = next(_whole_lines(file, text_blocks(file, encoding)), b"")
     except UnicodeDecodeError:
         return []
-    return _with_line_feeds(head).decode("utf-8", "replace").split("\n")[:HEADER_LINES]
+    return block.decode("utf-8", "replace").split("\n")[:HEADER_LINES]
 
 
 def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, list[str], str]]:

@@ -182,7 +182,7 @@ def read(tmp_path):
     def read(text):
         path = tmp_path / "pairs.csv"
         path.write_bytes(("pair_id,gap,note\n" + text).encode())
-        blocks = list(row_lines(path, text_form(path, TableForm())[0]))
+        blocks = list(row_lines(path, text_form(path, TableForm())))
         rows = b"".join(block.text for block in blocks).decode().splitlines()
         numbers = [int(line) for block in blocks for line in block.numbers]
         broken = [(line.row, *line.reasons) for block in blocks for line in block.broken]
@@ -244,7 +244,7 @@ def test_a_line_without_end_is_refused(read, monkeypatch):
 def test_a_header_with_wrong_quotations(write, header, problem):
     with pytest.raises(CatalogError, match=f"line 1: {problem}"):
         text_form(write(header + "\n"), TableForm())
-    form, _ = text_form(write('"a, b",c\r1,2'), TableForm())
+    form = text_form(write('"a, b",c\r1,2'), TableForm())
     assert form.meanings.cells == ("a, b", "c")
 
 
