@@ -102,12 +102,6 @@ def test_a_row_names_its_line_also_after_blank_and_broken_lines(write):
     assert pairs.attrs["rejected"][1].reasons == ("gap = -1 m is outside 0 to 10 m",)
 
 
-def test_a_comma_inside_quotes_is_no_separator(write):
-    row = GOOD.replace("corner shop", '"shop, corner"')
-    pairs = read_pairs(write(f"{HEADER}\n{row}\n"))
-    assert pairs.loc[0, "note"] == "shop, corner"
-
-
 def test_cells_with_line_breaks_are_read_and_every_line_is_counted(tmp_path):
     # as spreadsheets write headings of two lines; a bad row after them has its own line
     path = tmp_path / "pares.csv"
@@ -370,14 +364,6 @@ def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path):
         list(inventory.chunks(10))
 
 
-def test_a_quotation_mark_inside_a_cell_is_text(tmp_path):
-    path = tmp_path / "pairs.csv"
-    path.write_text("\n".join([ZONED, _row("a", note='a 5" wall'), _row("b")]))
-    table, rejected = _in_chunks([path], 100)
-    assert table["note"].tolist() == ['a 5" wall', "shop"]
-    assert rejected == []
-
-
 @pytest.mark.parametrize("size", [1, 3, 100])
 def test_parquet_in_chunks(csv, tmp_path, size):
     whole = read_pairs(csv)
@@ -407,16 +393,6 @@ def test_numbers_of_carried_columns_are_numbers_in_every_chunk(tmp_path):
         assert table["zone"].dtype == np.float64
         assert table["note"].tolist() == [*map(str, range(9)), "x"]
         assert np.isnan(table["zone"].iloc[-1])
-
-
-def test_an_inventory_of_many_rows_in_a_csv_file(tmp_path):
-    # more than one block of the reader, 1 MB
-    path = tmp_path / "pairs.csv"
-    path.write_text("\n".join([ZONED, *(_row(f"p{i}", note="x" * 100) for i in range(9000))]))
-    inventory = PairInventory([path])
-    lines = np.concatenate([chunk.rows.lines for chunk in inventory.chunks(1000)])
-    assert inventory.count == 9000
-    assert lines.tolist() == list(range(2, 9002))
 
 
 def test_whole_file_faults_come_before_the_first_chunk(tmp_path):
