@@ -129,7 +129,10 @@ class PairFile:
         for rows in self._blocks([IDENTIFIER] if is_named else self.names[:1]):
             column = rows.table.column(0).cast(pa.string())
             names = given_texts(column) if self._contents.is_text else column
-            yield names.combine_chunks() if is_named else pa.nulls(len(names), pa.string())
+            known = names.combine_chunks() if is_named else pa.nulls(len(names), pa.string())
+            # Rows of a Parquet file that are left out are counted as well
+            lost = 0 if self._contents.is_text else len(rows.broken)
+            yield pa.concat_arrays([known, pa.nulls(lost, pa.string())])
 
     def rows(self, size: int, are_pairs: bool = True) -> Iterator[RawRows]:
         """
