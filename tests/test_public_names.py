@@ -119,5 +119,5 @@ def test_a_run_needs_no_library_of_an_extra():
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    extras = {"gpxpy", "h3", "openpyxl", "playwright", "pyogrio", "pyproj", "pyvrp", "shapely"}
+    extras = {"h3", "openpyxl", "playwright", "pyogrio", "pyproj", "python_calamine", "shapely"}
     assert not extras & set(loaded)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from per_obspy.config import TableForm
-    from per_obspy.inventory.files.raw_rows import PairFile
+    from per_obspy.inventory.files.formats import PairFile
 
 
 def is_terminal() -> bool:
@@ -30,7 +30,7 @@ def asked_columns(path: "Path", form: "TableForm") -> "TableForm":
         Form of the table as far as it was recognised.
     """
     from per_obspy.inventory.files.formats import pair_file
-    from per_obspy.inventory.recognition.headings import is_building_list, missing_columns
+    from per_obspy.inventory.files.headings import is_building_list, missing_columns
 
     file = pair_file(path, form)
     columns = dict(form.columns)
@@ -75,7 +75,7 @@ def _choice(name: str, proposed: "Sequence[str]", others: "Sequence[str]") -> st
 
 def asked_units(units: "Mapping[str, str]") -> dict[str, str]:
     """Ask for the units of columns with implausible numbers, and return them."""
-    from per_obspy.inventory.recognition.units import unit_of, unit_problem
+    from per_obspy.inventory.files.words import unit_of, unit_problem
     from per_obspy.inventory.schema import COLUMNS
 
     confirmed = dict[str, str]()

@@ -158,7 +158,7 @@ def check_pairs(
     """
     from per_obspy.commands.pair_questions import asked_columns, asked_units, is_terminal
     from per_obspy.inventory.files.reading import checked_file, read_pairs
-    from per_obspy.inventory.recognition.side_file import form_as_toml, form_of, write_form
+    from per_obspy.inventory.files.side_file import form_as_toml, form_of, write_form
 
     # Names and units that are not plain, which a person confirms
     asks = is_terminal() and not as_json

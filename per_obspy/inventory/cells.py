@@ -17,8 +17,14 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
-from per_obspy.inventory.recognition.units import Unit, unit_of, unit_of_schema
-from per_obspy.inventory.recognition.words import named, plain_word, words
+from per_obspy.inventory.files.words import (
+    Unit,
+    named,
+    plain_word,
+    unit_of,
+    unit_of_schema,
+    words,
+)
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
 #: Column of the texts that were not understood, or are no exact value.
@@ -64,25 +70,16 @@ _FULL_WIDTH = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000:
 
 
 class CellForm(NamedTuple):
-    """
-    How the cells of a table are written.
+    """How the cells of a table are written."""
 
-    Attributes
-    ----------
-    units : mapping of str to Unit
-        Column -> unit of its numbers without one, where that is not the schema's.
-    marks : mapping of str to str
-        Column -> its decimal mark, where the column has commas.
-    language : str
-        Of the headings, empty if they are English or of none.
-    gap_unit : str
-        A unit other than m that cells of the gaps have, where their heading has none: a number
-        without a unit is then in doubt.
-    """
-
+    #: Column -> unit of its numbers without one, where that is not the schema's.
     units: Mapping[str, Unit] = {}
+    #: Column -> its decimal mark, where the column has commas.
     marks: Mapping[str, str] = {}
+    #: Of the headings, empty if they are English or of none.
     language: str = ""
+    #: A unit other than m that cells of the gaps have, where their heading has none: a number
+    #: without a unit is then in doubt.
     gap_unit: str = ""
 
 
@@ -91,45 +88,28 @@ PLAIN_CELLS = CellForm()
 
 
 class Value(NamedTuple):
-    """
-    Meaning of one text.
+    """Meaning of one text."""
 
-    Attributes
-    ----------
-    number : float
-        In the unit of the schema, NaN if it is unknown.
-    deviation : float
-        Standard deviation of a gap that is no exact one, 0 else.
-    note : str
-        What is wrong or special about the text, empty if nothing is.
-    is_placeholder : bool
-        Whether it is a number that means nothing.
-    """
-
+    #: In the unit of the schema, NaN if it is unknown.
     number: float
+    #: Standard deviation of a gap that is no exact one, 0 else.
     deviation: float = 0.0
+    #: What is wrong or special about the text, empty if nothing is.
     note: str = ""
+    #: Whether it is a number that means nothing.
     is_placeholder: bool = False
 
 
 class Numbers(NamedTuple):
-    """
-    A column of numbers.
+    """A column of numbers."""
 
-    Attributes
-    ----------
-    values, deviations : (n,) ndarray
-        In the unit of the schema; NaN where a cell is empty, unknown or not understood; deviations
-        are 0 where a value is exact.
-    notes : dict of int to str
-        Position of a row -> what is wrong or special about its cell.
-    placeholders : dict of int to float
-        Position of a row -> number in the unit of the schema that means nothing.
-    """
-
+    #: In the unit of the schema; NaN where a cell is empty, unknown or not understood; deviations
+    #: are 0 where a value is exact. Shape (n,).
     values: FloatArray
     deviations: FloatArray
+    #: Position of a row -> what is wrong or special about its cell.
     notes: dict[int, str]
+    #: Position of a row -> number in the unit of the schema that means nothing.
     placeholders: dict[int, float]
 
 
@@ -183,36 +163,33 @@ def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> N
     >>> read_numbers("height_1", pd.Series(["6 m", "20 ft", "-9999", "?"])).values.round(3)
     array([6.   , 6.096,   nan,   nan])
     """
-    is_truth = pd.api.types.is_bool_dtype(cells.dtype) and name == OBSERVED
-    if is_number(cells) or is_truth:
-        return _plain(name, cells.to_numpy(dtype=np.float64, na_value=np.nan), form)
+    if is_number(cells) or (name == OBSERVED and pd.api.types.is_bool_dtype(cells.dtype)):
+        raw = cells.to_numpy(dtype=np.float64, na_value=np.nan)
+        values = _in_schema(raw, form.units.get(name))
+        return _without(values, np.zeros_like(raw), placeholders(name, raw, values), {})
     # Each text once: a table has few different ones
     codes, texts = pd.factorize(cells.astype(str).mask(cells.isna(), ""))
     if name == "gap" and not form.gap_unit and name not in form.units:
         form = form._replace(gap_unit=unit_in_cells(texts))
     read = [read_number(name, text, form) for text in texts]
     # Back to the rows
-    numbers = np.array([one.number for one in read], dtype=float)
-    deviations = np.array([one.deviation for one in read], dtype=float)
-    is_none = np.array([one.is_placeholder for one in read], dtype=bool)
-    notes = _by_row(codes, [one.note for one in read])
-    return _without(numbers[codes], is_none[codes])._replace(
-        deviations=deviations[codes], notes=notes
-    )
+    columns = np.array([(value.number, value.deviation, value.is_placeholder) for value in read])
+    numbers, deviations, is_none = columns.reshape(-1, 3)[codes].T
+    notes = _by_row(codes, [value.note for value in read])
+    return _without(numbers, deviations, is_none > 0.0, notes)
 
 
-def _without(values: FloatArray, is_none: NDArray[np.bool_]) -> Numbers:
-    """Return exact numbers without those that mean nothing."""
+def _in_schema(numbers: FloatArray, unit: Unit | None) -> FloatArray:
+    return numbers if unit is None else numbers * unit.numerator / unit.denominator
+
+
+def _without(
+    values: FloatArray, deviations: FloatArray, is_none: NDArray[np.bool_], notes: dict[int, str]
+) -> Numbers:
+    """Return numbers without those that mean nothing."""
     # These are kept, as a message may need them
     lost = {row: float(values[row]) for row in np.flatnonzero(is_none).tolist()}
-    return Numbers(np.where(is_none, np.nan, values), np.zeros(values.size), {}, lost)
-
-
-def _plain(name: str, raw: FloatArray, form: CellForm) -> Numbers:
-    """Return numbers of a column in the unit of the schema."""
-    unit = form.units.get(name)
-    values = raw if unit is None else raw * unit.numerator / unit.denominator
-    return _without(values, placeholders(name, raw, values))
+    return Numbers(np.where(is_none, np.nan, values), deviations, notes, lost)
 
 
 def _by_row(codes: NDArray[np.int64], notes: Sequence[str]) -> dict[int, str]:
@@ -259,12 +236,19 @@ def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
     plain = text.translate(_FULL_WIDTH).strip()
     if is_unknown(plain):
         return Value(np.nan)
-    if len(plain) > LONGEST:
-        return _wrong(name, text)
+    value = _value(name, text.strip(), plain, form) if len(plain) <= LONGEST else None
+    return value or Value(
+        np.nan, note=f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number"
+    )
+
+
+def _value(name: str, text: str, plain: str, form: CellForm) -> Value | None:
+    """Return the meaning of a text that is not empty, None if it has none."""
     number = _exact(name, plain, form)
     if number is None:
-        inexact = _inexact(name, text.strip(), plain, form) if bare_name(name) == "gap" else None
-        return inexact or _wrong(name, text)
+        # Raised digits and fractions are no digits of a number
+        is_odd = any(letter.isnumeric() and not letter.isascii() for letter in plain)
+        return None if is_odd or name != "gap" else _inexact(name, text, plain, form)
     # A gap whose unit is in doubt
     if _lacks_unit(name, plain, number, form):
         note = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
@@ -274,12 +258,6 @@ def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
     raw = _decimal(digits[1], form.marks.get(name, "")) if digits else None
     is_none = placeholders(name, np.array([raw or number]), np.array([number]))
     return Value(number, is_placeholder=bool(is_none[0]))
-
-
-def _wrong(name: str, text: str) -> Value:
-    """Return the meaning of a text that is not understood."""
-    note = f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number"
-    return Value(np.nan, note=note)
 
 
 def _exact(name: str, text: str, form: CellForm) -> float | None:
@@ -351,60 +329,52 @@ def _quantity(name: str, text: str, form: CellForm) -> float | None:
 
 def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
     """Return a gap that is a word, a range, an estimate or a limit; None if it is none."""
-    # Raised digits and fractions are no digits of a number
-    if any(letter.isnumeric() and not letter.isascii() for letter in plain):
-        return None
     word = plain_word(plain.replace("’", "'").replace("(", " ").replace(")", " "))
     if word in words("touching"):
         return Value(0.0)
-    if (limited := _limited(name, text, word, form)) is not None:
-        return limited
-    return _ranged(name, text, word, form)
+    # An estimate or a limit, by the ends of what it may be
+    for kind, inner in _limits(word):
+        number = _bound(name, inner, form)
+        if number is not None and number >= 0.0:
+            if kind == "above":
+                return _noted(name, text, number, 0.0, "the least it may be")
+            if kind == "about":
+                return _even(name, text, number * (1.0 - ABOUT), number * (1.0 + ABOUT))
+            return _even(name, text, 0.0, number)
+    # A number with a deviation, or between two
+    for kind, first, second in _splits(word):
+        ends = _both(name, first, second, form)
+        if ends is not None and kind == "±":
+            return _noted(name, text, *ends, "")
+        if ends is not None and min(ends) >= 0.0:
+            return _even(name, text, *sorted(ends))
+    return None
 
 
-def _ranged(name: str, text: str, word: str, form: CellForm) -> Value | None:
-    """Return a gap between two numbers or with a deviation, None if it is none."""
-    if found := _PLUS_MINUS.fullmatch(word):
-        ends = _both(name, found[1], found[2], form)
-        return ends and _noted(name, text, ends[0], ends[1], "")
+def _splits(word: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the parts of a text before and after a sign between two numbers, with the sign."""
+    if parts := _PLUS_MINUS.fullmatch(word):
+        yield "±", parts[1], parts[2]
+        return
     # Words between blanks, signs anywhere
     for separator in words("to"):
         sign = re.escape(separator)
         sign = rf"\s+{sign}\s+" if separator.isalpha() and separator.isascii() else rf"\s*{sign}\s*"
-        if found := re.fullmatch(rf"(.*?\d.*?){sign}(.*\d.*)", word):
-            ends = _both(name, found[1], found[2], form)
-            if ends is not None and min(ends) >= 0.0:
-                return _even(name, text, *sorted(ends))
-    return None
+        if parts := re.fullmatch(rf"(.*?\d.*?){sign}(.*\d.*)", word):
+            yield separator, parts[1], parts[2]
 
 
-def _limited(name: str, text: str, word: str, form: CellForm) -> Value | None:
-    """Return a gap that is an estimate or a limit, None if it is none."""
+def _limits(word: str) -> Iterator[tuple[str, str]]:
+    """Yield kinds of estimates and limits, with the text without the word at one of its ends."""
     for kind in ("about", "below", "above"):
-        for inner in _inner(word, kind):
-            number = _bound(name, inner, form)
-            if number is None or number < 0.0:
-                continue
-            # The ends of what it may be
-            if kind == "above":
-                return _noted(name, text, number, 0.0, "the least it may be")
-            low = number * (1.0 - ABOUT) if kind == "about" else 0.0
-            return _even(name, text, low, number * (1.0 + ABOUT) if kind == "about" else number)
-    return None
-
-
-def _inner(word: str, kind: str) -> Iterator[str]:
-    """Yield a text without each word of a kind that is at its beginning or end."""
-    for sign in words(kind):
-        # No part of a longer word
-        is_word = sign[-1].isalpha() and sign.isascii()
-        start = rf"{re.escape(sign)}{r'(?![a-z])' if is_word else ''}[\s.]*(.+)"
-        end = (
-            rf"(.+?){r'(?<![a-z])' if sign[0].isalpha() and is_word else ''}\s*{re.escape(sign)}\.?"
-        )
-        for pattern in (start, end):
-            if found := re.fullmatch(pattern, word):
-                yield found[1].strip("() ")
+        for sign in words(kind):
+            # No part of a longer word
+            is_word = sign[-1].isalpha() and sign.isascii()
+            start = rf"{re.escape(sign)}{r'(?![a-z])' if is_word else ''}[\s.]*(.+)"
+            before = r"(?<![a-z])" if sign[0].isalpha() and is_word else ""
+            for pattern in (start, rf"(.+?){before}\s*{re.escape(sign)}\.?"):
+                if parts := re.fullmatch(pattern, word):
+                    yield kind, parts[1].strip("() ")
 
 
 def _bound(name: str, text: str, form: CellForm) -> float | None:
@@ -490,19 +460,17 @@ def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
         return texts, {}
     # Each text once
     codes, distinct = pd.factorize(texts)
-    chosen = [_chosen(column, text) for text in distinct]
-    allowed = ", ".join(column.choices)
+    choices = {text: _choice(column, text) for text in distinct}
+    allowed = f"is unknown, expected {', '.join(column.choices)}"
     notes = [
-        f"{name} = {shortened(text, LONGEST)!r} is unknown, expected {allowed}"
-        if word is None
-        else ""
-        for word, text in zip(chosen, distinct, strict=True)
+        f"{name} = {shortened(text, LONGEST)!r} {allowed}" if choice is None else ""
+        for text, choice in choices.items()
     ]
-    meanings = {text: word or "" for text, word in zip(distinct, chosen, strict=True)}
-    return texts.map(meanings), _by_row(codes, notes)
+    values = texts.map({text: choice or "" for text, choice in choices.items()})
+    return values, _by_row(codes, notes)
 
 
-def _chosen(column: Column, text: str) -> str | None:
+def _choice(column: Column, text: str) -> str | None:
     """Return the choice that a text means, "" if it is unknown, None if it means none of them."""
     word = plain_word(text)
     if not word or word in words("unknown"):

@@ -11,7 +11,7 @@ from per_obspy.config import Engine, Notify, Run, load
 from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
-from per_obspy.inventory.recognition.side_file import side_file
+from per_obspy.inventory.files.side_file import side_file
 from per_obspy.pipeline.inputs.drawn_pairs import layer_files
 from per_obspy.pipeline.inputs.extras import require_extras
 from per_obspy.records.contents.input_files import hash_if_readable, input_files

@@ -42,6 +42,7 @@ from messy_tables import (
 )
 from obspy import Stream
 from obspy.core.event import Catalog, Event, Magnitude, Origin
+from old_workbooks import workbook_of_kind
 from station_files import START, THREE, inventory, record
 
 from per_obspy import config
@@ -229,6 +230,10 @@ def _inventories() -> dict[str, Entry]:
         "pairs_turkish": Entry("pairs.csv", _turkish, _pairs),
         "pairs_utf_16": Entry("pairs.txt", _utf_16, _pairs),
         "pairs_xlsx": Entry("pairs.xlsx", _workbook, _pairs),
+        **{
+            f"pairs_{suffix}": Entry(f"pairs.{suffix}", partial(_workbook_of, suffix), _pairs)
+            for suffix in ("ods", "xlsb", "xls")
+        },
         "pairs_form": Entry("pairs.csv.toml", lambda: FORM, _pairs_beside),
         "pairs_parquet": Entry("pairs.parquet", _pairs_parquet, _pairs),
         "footprints_geojson": Entry("town.geojson", partial(_layer, "a.geojson"), _footprints),
@@ -372,6 +377,11 @@ def _turkish() -> bytes:
 def _utf_16() -> bytes:
     """Return a pair table in UTF-16 with tabulators."""
     return text_of(NAMES, ROWS, "\t", ",").encode("utf-16")
+
+
+def _workbook_of(suffix: str) -> bytes:
+    """Return a workbook of another kind."""
+    return workbook_of_kind(f".{suffix}", "Pairs", [NAMES, *ROWS])
 
 
 def _workbook() -> bytes:

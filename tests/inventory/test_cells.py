@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from per_obspy.inventory.cells import CellForm, read_columns, read_number, read_numbers, read_texts
-from per_obspy.inventory.recognition.units import unit_of
-from per_obspy.inventory.recognition.words import word_rows, words
+from per_obspy.inventory.files.words import unit_of, word_rows, words
 from per_obspy.inventory.schema import COLUMNS, SYSTEMS
 
 CM = CellForm({"gap": unit_of("cm", "gap")})

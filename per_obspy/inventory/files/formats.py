@@ -1,131 +1,276 @@
-"""Files of pairs by suffix: Parquet, CSV (:mod:`.csv_rows`) and workbooks."""
+"""
+Files of pairs: one reader of text, workbooks and Parquet files, which are opened by their suffix.
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+A file is read once for what its cells have in common (decimal marks, units, types), once for
+identifiers that may occur twice, then block by block.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet
-from numpy.typing import NDArray
+import pyarrow.compute as pc
 
 from per_obspy.config import TableForm
-from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import unreadable_reason
-from per_obspy.inventory.cells import CellForm
-from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
-from per_obspy.inventory.files.plain_columns import plain_columns
-from per_obspy.inventory.files.raw_rows import PairFile, RawRows, cell_form, with_values
-from per_obspy.inventory.files.workbook_rows import WorkbookFile
-from per_obspy.inventory.recognition.column_meanings import IDENTIFIER, meanings_of
-from per_obspy.inventory.recognition.side_file import form_of
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.cells import (
+    NOTES,
+    PLAIN_CELLS,
+    CellForm,
+    bare_name,
+    read_columns,
+    unit_in_cells,
+)
+from per_obspy.inventory.files.decimal_marks import Evidence, marks_of, two_readings, with_points
+from per_obspy.inventory.files.headings import IDENTIFIER
+from per_obspy.inventory.files.parquet import open_parquet
+from per_obspy.inventory.files.raw_rows import Contents, RawRows, regrouped
+from per_obspy.inventory.files.side_file import form_of
+from per_obspy.inventory.files.text_cells import given_text, given_texts
+from per_obspy.inventory.files.text_lines import TURKISH, open_text, two_pages
+from per_obspy.inventory.files.workbook import open_workbook
+from per_obspy.inventory.schema import COLUMNS, EMPTY
 
-#: Prefix that pandas gives to a column of row numbers.
-INDEX = "__index_level_"
+#: The default: the form of a table is recognised, not configured.
+PLAIN = TableForm()
 
-
-class ParquetFile:
-    """
-    Pairs in a Parquet file.
-
-    Parameters
-    ----------
-    file : Path
-        The file.
-    given : TableForm
-        Names and units of the user.
-    """
-
-    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
-        self.file = file
-        # Relative names such as http:/x are addresses to the reader
-        self._path = file.absolute()
-        with self._readable():
-            stored = pa.parquet.read_schema(self._path).names
-        self.headings = [name for name in stored if not name.startswith(INDEX)]
-        self.meanings = meanings_of(self.headings, given, str(file))
-        self.names: Sequence[str] = self.meanings.names
-
-    @property
-    def recognised(self) -> str:
-        """Names and units that are not those of the schema, empty if all are."""
-        return self.meanings.sentence()
-
-    def check_cells(self) -> None:
-        """Return without a change: numbers of a Parquet file can be read in one way only."""
-
-    def identifiers(self) -> Iterator[pa.Array]:
-        """Yield the identifiers of the pairs, block by block."""
-        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
-            if IDENTIFIER not in self.names:
-                yield pa.nulls(stored.metadata.num_rows, pa.string())
-                return
-            column = self.headings[self.names.index(IDENTIFIER)]
-            for batch in stored.iter_batches(columns=[column]):
-                if pa.types.is_nested(batch.schema.field(0).type):
-                    batch.column(0).cast(pa.string())  # lists and the like are no names
-                names, _ = plain_columns(pa.Table.from_batches([batch]))
-                yield names.column(0).cast(pa.string()).combine_chunks()
-
-    def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows in the units of the schema."""
-        line, form = 2, self._cell_form
-        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
-            for batch in stored.iter_batches(batch_size=size, columns=self.headings):
-                # Lines as if the file had a header
-                lines = np.arange(line, line + batch.num_rows)
-                # Names and units of the schema
-                table, faults = plain_columns(pa.Table.from_batches([batch]))
-                table = table.select(self.headings).rename_columns(self.names)
-                broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
-                good = np.isin(np.arange(batch.num_rows), list(faults), invert=True)
-                rows = with_values(table.filter(pa.array(good)), form)
-                yield RawRows(str(self.file), rows, lines[good], tuple(broken))
-                line += batch.num_rows
-
-    @property
-    def _cell_form(self) -> CellForm:
-        """Return how the cells are written; reads all gaps that are text."""
-        return cell_form(self.meanings, self._gaps(), {})
-
-    def _gaps(self) -> Iterator[pa.ChunkedArray]:
-        """Yield the gaps block by block."""
-        place = self.names.index("gap")
-        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
-            for batch in stored.iter_batches(columns=[self.headings[place]]):
-                yield plain_columns(pa.Table.from_batches([batch]))[0].column(0)
-
-    def _rejection(
-        self, table: pa.Table, lines: NDArray[np.int64], row: int, fault: str
-    ) -> Rejection:
-        """Return the rejection of a row."""
-        name = str(table[IDENTIFIER][row].as_py()) if IDENTIFIER in self.names else ""
-        return Rejection("pair", name, str(self.file), int(lines[row]), (fault,))
-
-    @contextmanager
-    def _readable(self) -> Iterator[None]:
-        """Turn a fault of the reader into one of the file."""
-        try:
-            yield
-        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-            problem = unreadable_reason(self.file, "Parquet table", error)
-            raise CatalogError(str(self.file), problem) from error
-
+#: Readers by suffix.
+_OPENERS = {
+    ".csv": open_text,
+    ".parquet": open_parquet,
+    **dict.fromkeys((".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"), open_workbook),
+    ".tsv": open_text,
+    ".txt": open_text,
+}
 
 #: Suffixes of layers of footprints, which are not pairs yet.
 FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb", ".gml", ".osm", ".pbf", ".geojsonl")
 
-#: Suffixes of other workbooks, which a spreadsheet program saves as .xlsx.
-WORKBOOKS = (".xls", ".xlsb", ".ods", ".numbers")
+#: Words for an empty cell.
+_EMPTY_WORDS = pa.array(sorted(EMPTY))
 
-_KINDS: dict[str, type[CsvFile] | type[ParquetFile] | type[WorkbookFile]] = {
-    ".csv": CsvFile,
-    ".parquet": ParquetFile,
-    ".xlsx": WorkbookFile,
-    ".xlsm": WorkbookFile,
-    ".tsv": CsvFile,
-    ".txt": CsvFile,
-}
+
+class PairFile:
+    """
+    Pairs in a file.
+
+    Every cell of a text is read as text, so that a message can contain a bad value as it is.
+
+    Parameters
+    ----------
+    contents : Contents
+        The file.
+    given : TableForm
+        Form of the table as configured by the user.
+
+    Attributes
+    ----------
+    names : list of str
+        Columns, by the schema where it knows them; columns without a name are left out.
+    headings : tuple of str
+        The header as it is in the file.
+    meanings : Meanings
+        Meanings of the headings.
+    """
+
+    def __init__(self, contents: Contents, given: TableForm = PLAIN) -> None:
+        self._contents, self._given = contents, given
+        self.meanings, self.headings = contents.meanings, contents.meanings.cells
+        self.names = [name for name in contents.names if name]
+
+    @property
+    def own_names(self) -> list[str]:
+        """Names of the columns as the file has them, in the order of ``names``."""
+        columns = zip(self.headings, self._contents.names, strict=True)
+        return [given_text(heading.strip()) for heading, name in columns if name]
+
+    @property
+    def recognised(self) -> str:
+        """Recognised peculiarities of the file, empty if there are none; reads the whole file."""
+        # Columns by their decimal mark
+        marks = self._survey[0].marks
+        kinds = {",": "decimal commas in ", ".": "commas between thousands in "}
+        texts = [*self._contents.form, self.meanings.sentence()]
+        for mark, kind in kinds.items():
+            names = ", ".join(name for name, known in marks.items() if known == mark)
+            texts.append(f"{kind}{names}" if names else "")
+        return "; ".join(text for text in texts if text)
+
+    def check_cells(self) -> None:
+        """
+        Read the whole file for what its cells have in common.
+
+        Raises
+        ------
+        CatalogError
+            If a number or letter of a known column can be read in two ways, or rows exceed the
+            header.
+        """
+        _ = self._survey
+        if self._contents.separator != ",":
+            return
+        # Decimal commas between commas make more cells, in every row
+        first = next(self._blocks(self.names[:1]))
+        counts = [
+            re.match(r"(\d+) columns, the header has", row.reasons[0]) for row in first.broken
+        ]
+        wide = [count and int(count[1]) > len(self.headings) for count in counts]
+        if len(first.lines) == 0 and wide and all(wide):
+            reason = f"no row has as many columns as the header ({first.broken[0].reasons[0]})"
+            mend = "separate columns by semicolons, or put cells with commas in quotation marks"
+            raise CatalogError(first.source, f"{reason}, as decimal commas make: {mend}")
+
+    def identifiers(self) -> Iterator[pa.Array]:
+        """Yield the identifiers of the pairs, block by block."""
+        is_named = IDENTIFIER in self.names
+        for rows in self._blocks([IDENTIFIER] if is_named else self.names[:1]):
+            column = rows.table.column(0).cast(pa.string())
+            names = given_texts(column) if self._contents.is_text else column
+            known = names.combine_chunks() if is_named else pa.nulls(len(names), pa.string())
+            # Rows of a Parquet file that are left out are counted as well
+            lost = 0 if self._contents.is_text else len(rows.broken)
+            yield pa.concat_arrays([known, pa.nulls(lost, pa.string())])
+
+    def rows(self, size: int, are_pairs: bool = True) -> Iterator[RawRows]:
+        """
+        Yield blocks of so many rows; lines without any content are left out.
+
+        Rows of pairs have values by the schema; others have text where a cell is no number.
+        """
+        for rows in regrouped(self._blocks(self.names), size):
+            table, lines = rows.table, rows.lines
+            if self._contents.is_text:
+                full = np.zeros(len(table), dtype=bool)
+                for column in table.columns:
+                    full |= np.asarray(pc.not_equal(column, ""))
+                # Numbers and texts as far as they are plain, then values
+                columns = {name: self._converted(name, table[name]) for name in self.names}
+                table, lines = pa.table(columns).filter(pa.array(full)), lines[full]
+            values = with_values(table, self._survey[0]) if are_pairs else table
+            yield rows._replace(table=values, lines=lines)
+
+    def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
+        """Yield these columns as the file has them, block by block, and the broken lines."""
+        places = [self._contents.names.index(name) for name in names]
+        for rows in self._contents.blocks(places):
+            yield rows._replace(table=rows.table.rename_columns(list(names)))
+
+    @cached_property
+    def _survey(self) -> tuple[CellForm, dict[str, list[pa.DataType]]]:
+        """
+        Return the form of the cells, and the types of number of columns unknown to the schema.
+
+        Raises
+        ------
+        CatalogError
+            If a number may be read in two ways, or a text of a known column may be.
+        """
+        common = _Common(self._contents, self.names)
+        for rows in self._blocks(common.names) if common.names else ():
+            common.add(rows)
+        marks, meanings = self._marks(common.evidence), self.meanings
+        form = CellForm(meanings.units, marks, meanings.language, common.gap_unit)
+        return form, common.types
+
+    def _marks(self, evidence: Mapping[str, Evidence]) -> dict[str, str]:
+        """Return the decimal mark of each column that has commas."""
+        if self._given.decimal:
+            commas = [name for name, column in evidence.items() if column.has_commas]
+            return dict.fromkeys(commas, self._given.decimal)
+        # The user has to decide if no number in the file does
+        marks, doubtful = marks_of(evidence)
+        for name, column in doubtful.items():
+            raise CatalogError(self._contents.source, two_readings(name, column))
+        return marks
+
+    def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
+        """Return a column of text as numbers if every cell is one, else as text."""
+        form, types = self._survey
+        if name not in COLUMNS and types.get(name):
+            return _as_numbers(cells, types[name][0])
+        if name not in COLUMNS or COLUMNS[name].dtype == "str":
+            return given_texts(cells)
+        # Commas between storeys may make a list
+        mark = form.marks.get(name) if bare_name(name) != "storeys" else None
+        points = with_points(cells, mark) if mark else cells
+        numbers = _as_numbers(points, pa.float64())
+        return points if numbers is None else numbers
+
+
+class _Common:
+    """
+    What the cells of a file have in common.
+
+    Attributes
+    ----------
+    names : list of str
+        Columns that have to be read for it.
+    evidence : dict of str to Evidence
+        Columns of numbers of the schema in a text -> meaning of their commas.
+    types : dict of str to list of DataType
+        Other columns of a text -> types of number that each of their cells can be.
+    gap_unit : str
+        A unit other than m that gaps have in their cells.
+    """
+
+    def __init__(self, contents: Contents, names: Sequence[str]) -> None:
+        is_number = {name: COLUMNS[name].dtype != "str" for name in names if name in COLUMNS}
+        text = names if contents.is_text else ()
+        self.evidence = {name: Evidence() for name in text if is_number.get(name)}
+        self.types = {name: [pa.int64(), pa.float64()] for name in text if name not in COLUMNS}
+        self.gap_unit = ""
+        # Texts only where letters are in doubt, gaps only where the heading has no unit
+        self._texts = [name for name in is_number if contents.is_doubtful and not is_number[name]]
+        self._gap = "" if "gap" in contents.meanings.units else "gap"
+        chosen = {*self.evidence, *self.types, *self._texts, self._gap}
+        self.names = [name for name in names if name in chosen]
+
+    def add(self, rows: RawRows) -> None:
+        """Look at further rows; raise CatalogError for a text that depends on the code page."""
+        for name, cells in zip(rows.table.column_names, rows.table.columns, strict=True):
+            if name in self.evidence:
+                self.evidence[name].add(cells, rows.lines)
+            if name in self.types:
+                # Drop every type that a cell contradicts
+                possible = {kind: _as_numbers(cells, kind) for kind in self.types[name]}
+                self.types[name] = [kind for kind in possible if possible[kind] is not None]
+            if name == self._gap and not self.gap_unit and pa.types.is_string(cells.type):
+                has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
+                self.gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
+            if name in self._texts:
+                # The first cell with a letter that is another one in Turkey
+                place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
+                if place >= 0:
+                    problem = two_pages(name, cells[place].as_py())
+                    raise CatalogError(rows.source, f"line {rows.lines[place]}: {problem}")
+
+
+def _as_numbers(cells: pa.ChunkedArray, kind: pa.DataType) -> pa.ChunkedArray | None:
+    """Return text as numbers if every cell is empty or a number, else None."""
+    text = pc.utf8_trim_whitespace(cells)
+    empty = pc.is_in(pc.utf8_lower(text), value_set=_EMPTY_WORDS)
+    try:
+        return pc.cast(pc.if_else(empty, None, text), kind)
+    except pa.ArrowInvalid:
+        return None
+
+
+def with_values(table: pa.Table, form: CellForm = PLAIN_CELLS) -> pa.Table:
+    """Return a table whose columns of numbers are numbers in the units of the schema."""
+    # Text is left to the checks
+    known = [name for name in table.column_names if name in COLUMNS]
+    chosen = [name for name in known if COLUMNS[name].dtype != "str" or name == NOTES]
+    values = read_columns({name: table[name].to_pandas() for name in chosen}, form)
+    for name, cells in values.items():
+        column = pa.chunked_array([pa.array(cells, from_pandas=True)])
+        if name in chosen:
+            table = table.set_column(table.column_names.index(name), name, column)
+        else:
+            table = table.append_column(name, column)
+    return table
 
 
 def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
@@ -146,18 +291,17 @@ def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
     MissingExtra
         If it is a workbook and the library for workbooks is not installed.
     """
-    # Layers of footprints are a common mistake
     suffix = path.suffix.lower()
-    if suffix not in _KINDS:
+    if suffix not in _OPENERS:
+        # Layers of footprints are a common mistake
         advice = (
             "; per-obspy pairs makes such a table of footprints" if suffix in FOOTPRINTS else ""
         )
-        advice = "; save the workbook as .xlsx" if suffix in WORKBOOKS else advice
-        expected = f"{', '.join(list(_KINDS)[:-1])} or {list(_KINDS)[-1]}"
-        raise CatalogError(
-            str(path), f"unknown suffix {path.suffix!r}, expected {expected}{advice}"
-        )
+        advice = "; save the workbook as .xlsx" if suffix == ".numbers" else advice
+        *others, last = _OPENERS
+        problem = f"unknown suffix {path.suffix!r}, expected {', '.join(others)} or {last}{advice}"
+        raise CatalogError(str(path), problem)
     if not path.is_file():
         raise CatalogError(str(path), "no such file")
-    file: PairFile = _KINDS[suffix](path, form_of(path, given))
-    return file
+    form = form_of(path, given)
+    return PairFile(_OPENERS[suffix](path, form), form)

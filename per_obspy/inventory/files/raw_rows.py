@@ -1,12 +1,7 @@
-"""
-Blocks of raw rows of a file of pairs, so that an inventory need not fit in memory.
+"""Rows of a table as its file has them, in blocks, so that an inventory need not fit in memory."""
 
-A file is read twice: once as a whole for its columns and for identifiers of pairs that may occur
-twice, then block by block.
-"""
-
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,61 +10,43 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
-from per_obspy.inventory.cells import NOTES, CellForm, read_columns, unit_in_cells
-from per_obspy.inventory.recognition.column_meanings import Meanings
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.files.headings import Meanings
 
 
 class RawRows(NamedTuple):
-    """
-    Consecutive rows of a file before any check.
+    """Consecutive rows of a file before any check."""
 
-    Attributes
-    ----------
-    source : str
-        The file.
-    table : Table
-        Numbers in the units of the schema, null where a cell is empty or not understood, with what
-        is said of such cells in ``cell_notes``; text as it is.
-    lines : (n_rows,) ndarray of int
-        Line of each row in its file; the header is line 1.
-    broken : tuple of Rejection
-        Lines between the rows that are no rows.
-    """
-
+    #: The file.
     source: str
+    #: Numbers in the units of the schema, null where a cell is empty or not understood, with what
+    #: is said of such cells in ``cell_notes``; text as it is.
     table: pa.Table
+    #: Line of each row in its file; the header is line 1. Shape (n_rows,).
     lines: NDArray[np.int64]
+    #: Lines between the rows that are no rows.
     broken: tuple[Rejection, ...]
 
 
-class PairFile(Protocol):
-    """A file of pairs: its columns, the identifiers of its pairs, its rows."""
+class Contents(NamedTuple):
+    """A table as its file has it."""
 
-    @property
-    def names(self) -> Sequence[str]:
-        """Columns, by the schema where it knows them."""
-
-    @property
-    def headings(self) -> Sequence[str]:
-        """The header as it is in the file."""
-
-    @property
-    def meanings(self) -> Meanings:
-        """Meanings of the headings."""
-
-    @property
-    def recognised(self) -> str:
-        """Recognised peculiarities of the file as text, empty if there are none."""
-
-    def check_cells(self) -> None:
-        """Raise CatalogError if a number or letter of a known column can be read in two ways."""
-
-    def identifiers(self) -> Iterator[pa.Array]:
-        """Yield the identifiers of the pairs, block by block."""
-
-    def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows."""
+    #: The file, with the sheet of a workbook.
+    source: str
+    #: Of its header.
+    meanings: Meanings
+    #: Of its columns, by the schema where it knows them; empty for a column without a name.
+    names: list[str]
+    #: ``blocks(places)`` yields these columns, named by their place, with the broken lines: every
+    #: line of the file is in one of the rows, broken or blank.
+    blocks: Callable[[Sequence[int]], Iterator[RawRows]]
+    #: How the file is written, where that is not plain.
+    form: tuple[str, ...] = ()
+    #: Whether every cell is text, so that numbers in it have to be recognised.
+    is_text: bool = True
+    #: Between the cells of a text.
+    separator: str = ""
+    #: Whether another encoding would give other letters, and no heading decides.
+    is_doubtful: bool = False
 
 
 def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
@@ -81,43 +58,36 @@ def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
     return hashes
 
 
-def with_values(table: pa.Table, form: CellForm) -> pa.Table:
-    """Return a table whose columns of numbers are numbers in the units of the schema."""
-    # Text is left to the checks
-    known = [name for name in table.column_names if name in COLUMNS]
-    chosen = [name for name in known if COLUMNS[name].dtype != "str" or name == NOTES]
-    read = read_columns({name: table[name].to_pandas() for name in chosen}, form)
-    for name, values in read.items():
-        column = pa.chunked_array([pa.array(values, from_pandas=True)])
-        if name in chosen:
-            table = table.set_column(table.column_names.index(name), name, column)
-        else:
-            table = table.append_column(name, column)
-    return table
-
-
-def cell_form(
-    meanings: Meanings, gaps: Iterable[pa.ChunkedArray], marks: Mapping[str, str]
-) -> CellForm:
-    """
-    Return how the cells of a file are written.
-
-    Parameters
-    ----------
-    meanings : Meanings
-        Of its headings.
-    gaps : iterable of ChunkedArray
-        The column of the gaps, block by block; only looked at if its heading has no unit.
-    marks : mapping of str to str
-        Column -> decimal mark.
-    """
-    # Units of headings, those of the schema too, and configured ones
-    units = {means.column: means.unit for means in meanings.columns.values() if means.unit}
-    units |= meanings.units
-    gap_unit = ""
-    for cells in () if "gap" in units else gaps:
-        if gap_unit or not pa.types.is_string(cells.type):
+def regrouped(blocks: Iterable[RawRows], size: int) -> Iterator[RawRows]:
+    """Yield the same rows in blocks of so many, each with the broken lines before its end."""
+    pending: list[RawRows] = []
+    for block in blocks:
+        pending.append(block)
+        if sum(len(rows.lines) for rows in pending) < size:
             continue
-        has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
-        gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
-    return CellForm(units, marks, meanings.language, gap_unit)
+        # Enough rows for a block or several; the rest waits
+        whole, first = together(pending), 0
+        while len(whole.lines) - first >= size:
+            yield _part(whole, first, first + size)
+            first += size
+        pending = [_part(whole, first, None)]
+    if any(len(rows.lines) or rows.broken for rows in pending):
+        yield together(pending)
+
+
+def together(blocks: Sequence[RawRows]) -> RawRows:
+    """Return consecutive blocks as a single one."""
+    table = pa.concat_tables([rows.table for rows in blocks], promote_options="permissive")
+    lines = np.concatenate([rows.lines for rows in blocks])
+    broken = tuple(line for rows in blocks for line in rows.broken)
+    return RawRows(blocks[0].source, table, lines, broken)
+
+
+def _part(rows: RawRows, first: int, end: int | None) -> RawRows:
+    """Return rows from the first to before the end, with the broken lines between them."""
+    # A broken line goes with the row after it
+    last_before = rows.lines[first - 1] if first else 0
+    last = np.inf if end is None else rows.lines[end - 1]
+    broken = tuple(line for line in rows.broken if last_before < (line.row or 0) < last)
+    table = rows.table.slice(first, None if end is None else end - first)
+    return rows._replace(table=table, lines=rows.lines[first:end], broken=broken)

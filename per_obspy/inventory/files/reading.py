@@ -14,9 +14,9 @@ from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection, printable
 from per_obspy.inventory.cells import read_columns
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs, row_names
-from per_obspy.inventory.files.formats import pair_file
-from per_obspy.inventory.files.raw_rows import PairFile, RawRows, name_hashes
-from per_obspy.inventory.recognition.column_meanings import IDENTIFIER
+from per_obspy.inventory.files.formats import PairFile, pair_file
+from per_obspy.inventory.files.headings import IDENTIFIER
+from per_obspy.inventory.files.raw_rows import RawRows, name_hashes
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.suspicions import ODD, Suspicions
 
@@ -25,21 +25,13 @@ ALL = 1 << 40
 
 
 class PairChunk(NamedTuple):
-    """
-    Consecutive rows of an inventory, not checked yet.
+    """Consecutive rows of an inventory, not checked yet."""
 
-    Attributes
-    ----------
-    rows : RawRows
-        Before any check.
-    repeated : (n_rows,) ndarray of bool
-        Whether an earlier row of the inventory has the row's ``pair_id``.
-    odd : (n_rows,) ndarray of object
-        Names of each row's suspicions, see :mod:`per_obspy.inventory.suspicions`.
-    """
-
+    #: Before any check.
     rows: RawRows
+    #: Whether an earlier row of the inventory has the row's ``pair_id``. Shape (n_rows,).
     repeated: NDArray[np.bool_]
+    #: Names of each row's suspicions, see :mod:`per_obspy.inventory.suspicions`. Shape (n_rows,).
     odd: NDArray[np.object_]
 
 
@@ -50,7 +42,7 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
     Parameters
     ----------
     path : str, Path or DataFrame
-        ``.csv``, ``.tsv`` or ``.txt``, ``.parquet``, or ``.xlsx``; or a table in memory, whose rows
+        ``.csv``, ``.tsv``, ``.txt``, ``.parquet`` or a workbook; or a table in memory, whose rows
         count as following a header in line 1. Columns, units and allowed ranges are in
         ``per_obspy.inventory.schema.COLUMNS``; further columns are carried through. Text that is
         not plain (UTF-8, commas, the names of the schema) is recognised where it is unambiguous.
@@ -85,23 +77,12 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
     if not isinstance(path, str | Path):
         raise TypeError(f"path must be a path or a DataFrame, got {type(path).__name__}")
     file = checked_file(Path(path), form)
-    rows = _all_rows(file, str(path))
-    pairs = _checked_whole(rows)
+    rows = next(file.rows(ALL), None)
+    if rows is None or not (len(rows.table) or rows.broken):
+        raise CatalogError(str(path), "the table has no rows")
+    pairs = _checked_whole(_named(rows, ""))
     pairs.attrs["recognised"] = file.recognised
     return pairs
-
-
-def _all_rows(file: PairFile, path: str) -> RawRows:
-    """Return the rows of a file in one piece."""
-    blocks = list(file.rows(ALL))
-    if not any(len(block.table) or block.broken for block in blocks):
-        raise CatalogError(path, "the table has no rows")
-    broken = tuple(line for block in blocks for line in block.broken)
-    # Join the blocks; empty ones may have other types
-    tables = [block.table for block in blocks if len(block.table)]
-    lines = np.concatenate([block.lines for block in blocks])
-    table = pa.concat_tables(tables or [blocks[0].table], promote_options="permissive")
-    return RawRows(blocks[0].source, table, lines, broken)
 
 
 def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
@@ -139,19 +120,19 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     texts = {name: cells.astype(str).mask(cells.isna()) for name, cells in known.items()}
     cells = pd.DataFrame(texts | read_columns(numbers) | {IDENTIFIER: row_names(table, lines)})
     raw = RawRows("table", pa.Table.from_pandas(cells, preserve_index=False), lines, ())
-    account, odd = _account(raw)
-    return _with_account(checked_pairs(_with_odd(table, odd), "table"), account)
+    return _checked_whole(raw, table)
 
 
-def _account(rows: RawRows) -> tuple[Suspicions, NDArray[np.object_]]:
-    """Return the account of what is odd in a whole table, and the names in each row."""
+def _checked_whole(rows: RawRows, table: pd.DataFrame | None = None) -> pd.DataFrame:
+    """Check all rows of a file, or of a table in memory, with suspicions and proposed units."""
+    # The account comes first, as the checks leave rows out
     account = Suspicions()
     repeated = pd.Series(name_hashes(_identifiers(rows.table))).duplicated().to_numpy()
-    return account, account.add(rows.source, rows.table, rows.lines, repeated)
-
-
-def _with_account(pairs: pd.DataFrame, account: Suspicions) -> pd.DataFrame:
-    """Return pairs with the sentences on what is odd, and units that would explain it."""
+    odd = account.add(rows.source, rows.table, rows.lines, repeated)
+    if table is None:
+        pairs = _checked(rows, None, odd)
+    else:
+        pairs = checked_pairs(_with_odd(table, odd), rows.source)
     pairs.attrs |= {"suspicions": account.sentences(), "proposed_units": account.units()}
     return pairs
 
@@ -160,13 +141,6 @@ def _with_odd(table: pd.DataFrame, odd: NDArray[np.object_]) -> pd.DataFrame:
     """Return a table with the names of each row's suspicions, if there are any."""
     table = table.drop(columns=ODD, errors="ignore")
     return table.assign(**{ODD: odd}) if any(odd) else table
-
-
-def _checked_whole(rows: RawRows) -> pd.DataFrame:
-    """Check all rows of a file, with suspicions and proposed units."""
-    rows = _named(rows, "")
-    account, odd = _account(rows)
-    return _with_account(_checked(rows, None, odd), account)
 
 
 class PairInventory:

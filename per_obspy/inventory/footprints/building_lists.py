@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection, shortened
 from per_obspy.inventory.cells import is_unknown, read_numbers
-from per_obspy.inventory.files.csv_rows import CsvFile
+from per_obspy.inventory.files.formats import PLAIN, PairFile
+from per_obspy.inventory.files.text_lines import open_text
 
 #: More rows than any list has.
 ALL = 1 << 40
@@ -84,7 +85,7 @@ def read_list(file: Path) -> BuildingList:
         If it is no CSV table, has a column twice, or lacks the columns that make outlines; the
         message names those.
     """
-    table = CsvFile(file)
+    table = PairFile(open_text(file, PLAIN))
     # Headings as they are: their translations are those of pairs
     names = table.own_names
     columns = _columns(file, names)

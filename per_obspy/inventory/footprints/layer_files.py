@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection, TryLater, shortened
 from per_obspy.files import scratch_folder, unreadable_reason, writing
-from per_obspy.inventory.files.plain_columns import plain_columns
+from per_obspy.inventory.files.parquet import plain_columns
 from per_obspy.inventory.footprints.building_lists import read_list
 from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.inventory.importers.building_files import SUFFIXES, read_buildings

@@ -65,7 +65,8 @@ _WORDS = {
 }
 
 #: Suffixes of tables and layers whose beginning does not show what they are.
-_SUFFIXES = {".csv": Kind.PAIRS, ".tsv": Kind.PAIRS, ".xlsx": Kind.PAIRS, ".pbf": Kind.FOOTPRINTS}
+_TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
+_SUFFIXES = {**dict.fromkeys(_TABLES, Kind.PAIRS), ".pbf": Kind.FOOTPRINTS}
 
 #: Columns of a table of footprints, and of a risk table.
 _GEOMETRY, _RISK = {"geometry", "wkt", "wkb"}, {"pair_id", "state", "rank", "probability"}

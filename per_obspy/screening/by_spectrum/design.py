@@ -20,7 +20,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
 from per_obspy.errors import CatalogError, Rejection, reason_of
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.inventory.recognition.csv_text import check_separator, check_text
+from per_obspy.inventory.files.text_lines import check_separator, check_text
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.by_record.station_motion import LogSpectra, log_period_and_damping
 from per_obspy.screening.by_spectrum.demand import (

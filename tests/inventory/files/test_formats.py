@@ -24,7 +24,8 @@ WRONG_FILES = [
         r"expected \.csv, .* or \.txt; per-obspy pairs makes such a table of footprints",
     ),
     (b"x", "pairs.xlsx", "not a readable workbook .* not a zip file"),
-    (b"x", "pairs.ods", "unknown suffix '.ods', .* save the workbook as .xlsx"),
+    (b"x", "pairs.ods", "not a readable workbook .* not a zip file"),
+    (b"x", "pairs.numbers", "unknown suffix '.numbers', .* save the workbook as .xlsx"),
 ]
 
 

@@ -5,38 +5,28 @@ Decimal commas and thousands in columns of text, decided by all numbers of a col
 thousands; ``1,234`` may be either, so that another number of the table has to decide.
 """
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-
-from per_obspy.inventory.recognition.csv_text import text_blocks
+from numpy.typing import NDArray
 
 #: Signs between thousands other than comma and point: blanks and apostrophes.
 _GROUPS = "[ '’\u00a0\u202f]"
 
-#: Numbers whose comma is a decimal mark.
+#: Numbers whose comma is a decimal mark, whose commas are between thousands, whose comma may be
+#: either, and whose mark can only be a decimal point.
 _DECIMAL = (
     rf"^\s*[+-]?(?:\d*,\d{{1,2}}|\d*,\d{{4,}}|0*,\d+|0\d*,\d+|\d{{4,}},\d+"
     rf"|[1-9]\d{{0,2}}(?:(?:\.|{_GROUPS})\d{{3}})+,\d+)(?:[eE][+-]?\d+)?\s*$"
 )
-
-#: Numbers whose commas are between thousands.
 _THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})\s*$"
-
-#: Numbers whose comma may be either.
 _EITHER = r"^\s*[+-]?[1-9]\d{0,2},\d{3}\s*$"
-
-#: Numbers whose mark can only be a decimal point.
 _DECIMAL_POINT = (
     r"^\s*[+-]?(?:\d*\.\d{1,2}|\d*\.\d{4,}|0*\.\d+|0\d*\.\d+|\d{4,}\.\d+)(?:[eE][+-]?\d+)?\s*$"
 )
-
-#: In the order of :class:`Evidence`.
-_KINDS = (_DECIMAL, _THOUSANDS, _EITHER, _DECIMAL_POINT)
 
 #: Characters to replace in a column of decimal commas; groups of digits among them.
 _WITH_COMMA = (
@@ -51,75 +41,41 @@ _POINT = r"^\s*[+-]?[1-9]\d{0,2}\.\d{3}\s*$"
 _WITH_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?\s*$"
 
 
-#: A quoted number with a comma, and its greatest length.
-_LONGEST_NUMBER = 64
-_QUOTED = re.compile(rb"\"\s{0,8}[+-]?[\d.'\xc2\xa0 ]{0,40},\d")
+@dataclass
+class Evidence:
+    """Evidence in the numbers of a column about the meaning of their commas."""
 
-
-class Evidence(NamedTuple):
-    """
-    Evidence in the numbers of a column about the meaning of their commas.
-
-    Attributes
-    ----------
-    decimal, thousands, either, point : int
-        Number of cells of each kind; ``point`` are marks that can only be decimal points.
-    example : str
-        The first cell that may be either.
-    line : int
-        Its line in the file.
-    """
-
-    decimal: int = 0
-    thousands: int = 0
-    either: int = 0
-    point: int = 0
+    #: Whether a comma is a decimal mark, commas are between thousands, or a mark can only be a
+    #: decimal point.
+    decimal: bool = False
+    thousands: bool = False
+    point: bool = False
+    #: The first cell whose comma may be either; empty without one.
     example: str = ""
+    #: Its line in the file.
     line: int = 0
 
     @property
     def has_commas(self) -> bool:
         """Whether a number has a comma."""
-        return self.decimal + self.thousands + self.either > 0
+        return self.decimal or self.thousands or self.example != ""
+
+    def add(self, cells: pa.ChunkedArray, lines: Sequence[int] | NDArray[np.int64]) -> None:
+        """Add the evidence of further cells, of the lines of a file."""
+        commas = cells.filter(pc.match_substring(cells, ","))
+        self.decimal = self.decimal or _any(commas, _DECIMAL)
+        self.thousands = self.thousands or _any(commas, _THOUSANDS)
+        # The sign alone is sought faster
+        points = cells if self.point else cells.filter(pc.match_substring(cells, "."))
+        self.point = self.point or _any(points, _DECIMAL_POINT)
+        if not self.example and _any(commas, _EITHER):
+            place = pc.index(pc.match_substring_regex(cells, _EITHER), value=True).as_py()
+            self.example, self.line = str(cells[place].as_py()).strip(), int(lines[place])
 
 
-def has_quoted_commas(file: Path, encoding: str) -> bool:
-    """Return whether a text has a number, or a similar text, with a comma in quotation marks."""
-    last = b""
-    for block in text_blocks(file, encoding):
-        text = last + block
-        if b'"' in text and _QUOTED.search(text):
-            return True
-        last = text[-_LONGEST_NUMBER:]
-    return False
-
-
-def evidence_of(blocks: Iterable[tuple[pa.Table, Sequence[int]]]) -> dict[str, Evidence]:
-    """Return the evidence of every column, from blocks of text with the lines of their rows."""
-    found: dict[str, Evidence] = {}
-    for table, lines in blocks:
-        for name, cells in zip(table.column_names, table.columns, strict=True):
-            found[name] = _more(found.get(name, Evidence()), cells, lines)
-    return found
-
-
-def _more(known: Evidence, cells: pa.ChunkedArray, lines: Sequence[int]) -> Evidence:
-    """Return the evidence with that of further cells."""
-    matches = [pc.match_substring_regex(cells, kind) for kind in _KINDS]
-    counts = [pc.sum(match).as_py() or 0 for match in matches]
-    # Messages name the first ambiguous number
-    example, line = known.example, known.line
-    place = pc.index(matches[2], value=True).as_py()
-    if not example and place >= 0:
-        example, line = str(cells[place].as_py()).strip(), lines[place]
-    return Evidence(
-        known.decimal + counts[0],
-        known.thousands + counts[1],
-        known.either + counts[2],
-        known.point + counts[3],
-        example,
-        line,
-    )
+def _any(cells: pa.ChunkedArray, pattern: str) -> bool:
+    """Return whether any text is of a pattern."""
+    return len(cells) > 0 and bool(pc.any(pc.match_substring_regex(cells, pattern)).as_py())
 
 
 def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str, Evidence]]:
@@ -138,14 +94,14 @@ def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str
     marks, doubtful = dict[str, str](), dict[str, Evidence]()
     for name, column in evidence.items():
         # The numbers of the column decide, else those of the other columns
-        kinds = (column.decimal > 0, column.thousands > 0, column.point > 0)
+        kinds = (column.decimal, column.thousands, column.point)
         if kinds == (True, False, False):
             marks[name] = ","
         elif kinds[:2] == (False, True):
             marks[name] = "."
-        elif column.either and not any(kinds) and others and has_decimals != has_thousands:
+        elif column.example and not any(kinds) and others and has_decimals != has_thousands:
             marks[name] = others
-        elif column.either and not column.decimal:
+        elif column.example and not column.decimal:
             doubtful[name] = column
     return marks, doubtful
 
@@ -172,16 +128,17 @@ def with_points(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
     # Signs between thousands go, the comma becomes a point
     bare = pc.replace_substring_regex(cells, rf"(\d)(?:\.|{_GROUPS})", r"\1")
     plain = pc.replace_substring(bare, ",", ".")
-    changes = (_WITH_COMMA, _GROUPED)
-    is_comma, is_grouped = (pc.match_substring_regex(cells, kind) for kind in changes)
+    is_comma, is_grouped = (
+        pc.match_substring_regex(cells, kind) for kind in (_WITH_COMMA, _GROUPED)
+    )
     # A point with three digits behind it is no number that anyone can be sure of
     other = pc.binary_join_element_wise(cells, " (or ", bare, "?)", "")
     doubtful = pc.if_else(pc.match_substring_regex(cells, _POINT), other, cells)
     return pc.if_else(pc.or_(is_comma, is_grouped), plain, doubtful)
 
 
-def two_readings(name: str, found: Evidence) -> str:
+def two_readings(name: str, column: Evidence) -> str:
     """Return a message on the ambiguous commas of a column, and the remedy."""
-    comma, none = found.example.replace(",", "."), found.example.replace(",", "")
-    reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
+    comma, none = column.example.replace(",", "."), column.example.replace(",", "")
+    reason = f"line {column.line}: {name} = {column.example!r} is {comma} or {none}"
     return f'{reason}, and no other number decides: give decimal = "," or "." in [pairs]'

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from per_obspy.inventory.files.plain_columns import plain_columns
+from per_obspy.inventory.files.parquet import plain_columns
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk, read_pairs
 
 DAY = datetime.date(2020, 1, 1)

@@ -1,16 +1,18 @@
-"""Hostile and damaged workbooks end in one line, before they take memory or time."""
+"""Workbooks of every kind; hostile and damaged ones end in one line, before they take memory."""
 
 import datetime
+import re
 import sys
 import tracemalloc
 
 import pytest
 from messy_tables import NAMES, ROWS, changed_parts, with_shared_texts, workbook_of
+from old_workbooks import workbook_of_kind
+from pandas.testing import assert_frame_equal
 
 from per_obspy import read_pairs
 from per_obspy.errors import CatalogError, MissingExtra
-from per_obspy.inventory.recognition import workbook
-from per_obspy.inventory.recognition.workbook import sheet_rows, workbook_sheets
+from per_obspy.inventory.files import workbook
 
 SHEET, TEXTS = "xl/worksheets/sheet1.xml", "xl/sharedStrings.xml"
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
@@ -46,19 +48,24 @@ HOSTILE = {
     "a row without an end": (
         "sheet",
         lambda _: _sheet(b'<row r="1">' + b'<c r="A1"/>' * 700_000),
-        "has a row of more than 2 MB",
+        "no sheet has cells",
     ),
     "too many rows": (
         "sheet",
         lambda _: _sheet(b"<row></row>" * 1_100_000),
-        "1100000 rows, at most",
+        "no sheet has cells",
     ),
     "texts larger than any table's": (
         "texts",
         lambda _: b"<sst>" + b"<si><t>x</t></si>" * 2_100_000,
-        "34 MB unpacked, at most 32 MB are read",
+        "34 MB unpacked, .* times as much as packed: at most 200",
     ),
-    "styles without end": ("styles", lambda _: b"<a/>" * 600_000, "2 MB unpacked, at most 2 MB"),
+    "styles without end": ("styles", lambda _: b"<a/>" * 600_000, "not a readable workbook"),
+    "a cell at the end of the world": (
+        "sheet",
+        lambda xml: xml.replace(b'r="J3"', b'r="XFD1048576"'),
+        "MiB of memory",
+    ),
     "entities that grow": (
         "sheet",
         lambda xml: b'<!DOCTYPE x [<!ENTITY a "aaaaaaaa">]>' + xml,
@@ -101,10 +108,10 @@ def test_a_hostile_workbook_is_refused_within_memory(write, kind):
     assert peak < 64 << 20
 
 
-def test_a_row_far_below_is_no_table_of_blank_rows(write):
-    # would catch 1e9 blank rows that are made up to the row's number
+def test_a_row_is_where_its_cells_are(write):
+    # would catch 1e9 blank rows that are made up to the row's number, and a last row that is lost
     path = write(sheet=lambda xml: xml.replace(b'<row r="4"', b'<row r="999999999"'))
-    assert read_pairs(path)["pair_id"].tolist() == ["a", "b"]
+    assert read_pairs(path)["pair_id"].tolist() == ["a", "b", "c"]
 
 
 def test_cut_and_foreign_files(write):
@@ -158,18 +165,49 @@ def test_numbers_keep_all_their_digits(write):
     assert pairs["longitude_1"].tolist() == [row[2] for row in rows]
 
 
-def test_sheets_and_rows(write, monkeypatch):
+def test_too_many_sheets(write):
+    sheets = {str(number): [[number]] for number in range(workbook.MOST_SHEETS + 1)}
     path = write()
-    (sheet,) = workbook_sheets(path, 2)
-    assert (sheet.name, len(sheet.head)) == ("Pairs", 2)
-    assert len(list(sheet_rows(path, "Pairs", 3))) == 4
-    monkeypatch.setattr(workbook, "MOST_SHEETS", 0)
-    with pytest.raises(CatalogError, match="1 sheets, at most 0"):
-        workbook_sheets(path, 2)
+    path.write_bytes(workbook_of(sheets))
+    with pytest.raises(CatalogError, match="101 sheets, at most 100"):
+        read_pairs(path)
+
+
+def test_a_formula_of_an_empty_text_is_empty(write):
+    # would catch a spreadsheet's "" taken for a formula that was never computed
+    def change(xml):
+        cell = rb'<c r="B4"[^>]*><v>0</v></c>'
+        return re.sub(cell, b'<c r="B4" t="str"><f>""</f><v></v></c>', xml)
+
+    pairs = read_pairs(write(sheet=change))
+    assert pairs["gap"].isna().tolist() == [False, False, True]
+    assert "cell_notes" not in pairs
+
+
+def test_a_last_row_of_uncomputed_formulas_is_no_blank_row(write):
+    rows = [NAMES, *ROWS, [f"={cell!r}" for cell in ROWS[0]]]
+    with pytest.raises(CatalogError, match="row 5, pair_id: a formula without a stored value"):
+        read_pairs(write(rows))
+
+
+@pytest.mark.parametrize("suffix", [".ods", ".xlsb", ".xls"])
+def test_other_kinds_of_workbooks(write, suffix):
+    path = write().with_suffix(suffix)
+    path.write_bytes(workbook_of_kind(suffix, "Pairs", [NAMES, *ROWS]))
+    pairs, expected = read_pairs(path), read_pairs(write())
+    assert_frame_equal(pairs, expected)
+    assert pairs.attrs["recognised"] == "sheet 'Pairs'"
+    # An error is an unknown gap
+    path.write_bytes(workbook_of_kind(suffix, "Pairs", [NAMES, ["a", "#REF!", *ROWS[0][2:]]]))
+    assert read_pairs(path)["gap"].isna().tolist() == [True]
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(CatalogError, match=r"not a (readable )?workbook \("):
+        read_pairs(path)
 
 
 def test_a_missing_library_is_one_line_that_names_the_extra(write, monkeypatch):
     path = write()
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(MissingExtra, match=r"pip install 'per_obspy\[spreadsheet\]'"):
         read_pairs(path)

@@ -8,6 +8,8 @@ the section ``[pairs]`` of a configuration comes before it.
 import json
 from pathlib import Path
 
+import tomlkit
+
 from per_obspy.config import TableForm, load
 from per_obspy.files import written_whole
 
@@ -79,18 +81,5 @@ def form_as_toml(form: TableForm, section: str = "") -> str:
     [pairs.units]
     gap = "cm"
     """
-    # Single keys come before the tables of names and units
     values = form.model_dump(exclude_defaults=True)
-    tables = [name for name in ("columns", "units") if values.get(name)]
-    single = [f"{name} = {_text(value)}" for name, value in values.items() if name not in tables]
-    parts = ["\n".join([f"[{section}]", *single] if section else single)] if single else []
-    for name in tables:
-        lines = [f"{key} = {_text(value)}" for key, value in values[name].items()]
-        prefix = f"{section}." if section else ""
-        parts.append("\n".join([f"[{prefix}{name}]", *lines]))
-    return "\n\n".join(parts) + "\n"
-
-
-def _text(value: str) -> str:
-    """Return a text as TOML: its basic strings have the escapes of JSON."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return tomlkit.dumps({section: values} if section else values)

@@ -1,16 +1,11 @@
-"""
-Headings of several languages and forms, and meanings that they never have.
-
-Also of per_obspy.inventory.recognition.column_meanings.
-"""
+"""Headings of several languages and forms, and meanings that they never have."""
 
 import pytest
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.recognition.column_meanings import meanings_of
-from per_obspy.inventory.recognition.headings import meaning, recognised
-from per_obspy.inventory.recognition.words import word_rows
+from per_obspy.inventory.files.headings import meaning, meanings_of, recognised
+from per_obspy.inventory.files.words import word_rows
 from per_obspy.inventory.schema import COLUMNS
 
 #: heading -> column and unit

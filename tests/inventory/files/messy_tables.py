@@ -209,7 +209,7 @@ def refused() -> dict[str, Messy]:
         ),
         "UTF-8 with a damaged letter": Messy("pairs.csv", cut),
         "a list of buildings": Messy("buildings.csv", buildings.encode()),
-        "an old workbook": Messy("pairs.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500)),
+        "a damaged old workbook": Messy("pairs.xls", b"\xd0\xcf\x11\xe0" + bytes(500)),
     }
 
 

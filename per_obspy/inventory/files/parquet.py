@@ -1,10 +1,76 @@
-"""Columns of Parquet files in the few types that every later table can hold."""
+"""Parquet tables, and columns of any type in the few types that every later table can hold."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet
+
+from per_obspy.config import TableForm
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import unreadable_reason
+from per_obspy.inventory.files.headings import IDENTIFIER, Meanings, meanings_of
+from per_obspy.inventory.files.raw_rows import Contents, RawRows
+
+#: Prefix that pandas gives to a column of row numbers.
+INDEX = "__index_level_"
 
 #: Reason for which a row is left out.
 NOT_UTF_8 = "{} is not UTF-8"
+
+
+def open_parquet(file: Path, given: TableForm) -> Contents:
+    """
+    Open a Parquet table.
+
+    Raises
+    ------
+    CatalogError
+        If it cannot be read, lacks a configured column, or the names of its pairs are no text.
+    """
+    with _readable(file):
+        schema = pa.parquet.read_schema(file.absolute())
+        meanings = meanings_of(
+            [name for name in schema.names if not name.startswith(INDEX)], given, str(file)
+        )
+        # Lists and the like are no names
+        for heading, name in zip(meanings.cells, meanings.names, strict=True):
+            if name == IDENTIFIER and pa.types.is_nested(schema.field(heading).type):
+                pa.nulls(1, schema.field(heading).type).cast(pa.string())
+    blocks = partial(_parquet_rows, file, meanings)
+    return Contents(str(file), meanings, meanings.names, blocks, is_text=False)
+
+
+def _parquet_rows(file: Path, meanings: Meanings, places: Sequence[int]) -> Iterator[RawRows]:
+    """Yield the rows of some columns, with rejections of text that is not UTF-8."""
+    columns = [meanings.cells[place] for place in places]
+    identifier = dict(zip(meanings.names, meanings.cells, strict=True)).get(IDENTIFIER)
+    line = 2  # as if the file had a header
+    # Relative names such as http:/x are addresses to the reader
+    with _readable(file), pa.parquet.ParquetFile(file.absolute(), pre_buffer=False) as stored:
+        for batch in stored.iter_batches(columns=columns):
+            table, faults = plain_columns(pa.Table.from_batches([batch]).select(columns))
+            broken = []
+            for row, fault in faults.items():
+                pair = str(table[identifier][row]) if identifier in columns else ""
+                broken.append(Rejection("pair", pair, str(file), line + row, (fault,)))
+            good = np.delete(np.arange(len(table)), list(faults))
+            yield RawRows(str(file), table.take(good), line + good, tuple(broken))
+            line += len(table)
+
+
+@contextmanager
+def _readable(file: Path) -> Iterator[None]:
+    """Turn a fault of the reader into one of the file."""
+    try:
+        yield
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        problem = unreadable_reason(file, "Parquet table", error)
+        raise CatalogError(str(file), problem) from error
 
 
 def plain_columns(table: pa.Table) -> tuple[pa.Table, dict[int, str]]:

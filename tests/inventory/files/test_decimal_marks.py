@@ -1,7 +1,7 @@
 """
 Decimal marks of whole columns: decisive, ambiguous and unchanged cells.
 
-Also of per_obspy.inventory.recognition.units.
+Also of per_obspy.inventory.files.words.
 """
 
 import math
@@ -14,14 +14,17 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from per_obspy.inventory.cells import CellForm, read_numbers
-from per_obspy.inventory.recognition.decimal_marks import evidence_of, marks_of, with_points
-from per_obspy.inventory.recognition.units import unit_of, unit_problem
+from per_obspy.inventory.files.decimal_marks import Evidence, marks_of, with_points
+from per_obspy.inventory.files.words import unit_of, unit_problem
 
 
 def _decided(**columns):
     length = max(map(len, columns.values()))
-    padded = {name: [*cells, *[""] * (length - len(cells))] for name, cells in columns.items()}
-    marks, doubtful = marks_of(evidence_of([(pa.table(padded), range(2, length + 2))]))
+    evidence = {name: Evidence() for name in columns}
+    for name, cells in columns.items():
+        padded = pa.chunked_array([[*cells, *[""] * (length - len(cells))]])
+        evidence[name].add(padded, range(2, length + 2))
+    marks, doubtful = marks_of(evidence)
     return marks, {name: (found.line, found.example) for name, found in doubtful.items()}
 
 

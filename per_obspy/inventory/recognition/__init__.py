@@ -1,1 +1,0 @@
-"""Recognise how a table is written: encoding, separator, decimal mark, headings, units."""
