@@ -14,7 +14,7 @@ from obspy.core.trace import Stats
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.formats.text.conversions import full_year, utc
+from per_obspy.formats.text.header import full_year, utc
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -75,7 +75,7 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
         refuse(text, 2, "units", f"{quoted(text, 2)} is not a PEER quantity and unit")
     unit, factor = _UNITS[units[1], units[2]]
     samples, dt = _size(text)
-    values = factor * free_block(text, 4, None, samples)
+    values = factor * free_block(text, 4, samples)
     # Words of the header
     words = {"units": unit, "quantity": units[1].lower(), "processing_level": "processed"}
     words |= _title(text) | {"corners": _corners(text)}

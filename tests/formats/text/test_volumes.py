@@ -1,4 +1,4 @@
-"""Digitised film on even steps."""
+"""Titled blocks of samples, and digitised film on even steps."""
 
 import io
 
@@ -11,8 +11,8 @@ from sample_file import MOTION, block, film
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.smc import read_smc
-from per_obspy.formats.text.film import even_film, film_lines, read_film
 from per_obspy.formats.text.lines import Text
+from per_obspy.formats.text.volumes import even_film, is_title, read_film, titled_block
 
 
 def text_of(content: str) -> Text:
@@ -23,10 +23,20 @@ def even(times: np.ndarray, values: np.ndarray):
     return even_film(text_of(""), 0, np.column_stack((times, values)), 5)
 
 
+@pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
+def test_a_title_announces_interval_or_rate(spacing: str):
+    title = f" {len(MOTION)} points of accel data {spacing}, in cm/sec2. (8f10.6)"
+    text = text_of(f"{title}\n{block(MOTION, '%10.6f', 8)}\nnext")
+    assert is_title(title)
+    values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
+    assert_array_equal(values, MOTION)
+    assert (dt, text.lines[line]) == (0.01, "next")
+
+
 def test_even_film_gives_its_values_and_their_mean_interval():
     text = text_of(film(MOTION, 0.02))
     result = read_film(text, 0, len(MOTION))
-    assert film_lines(len(MOTION)) == len(text.lines)
+    assert result.next_line == len(text.lines)
     # times and values are written to three decimals
     assert_allclose(result.values, np.round(MOTION, 3), rtol=1e-15)
     assert result.dt == pytest.approx(0.02, rel=1e-12)
