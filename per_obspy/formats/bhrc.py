@@ -32,7 +32,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import horizontal, read_components, trace
+from per_obspy.formats.text.vocabulary import Words, horizontal, read_components, trace
 from per_obspy.formats.text.volumes import sensor_constants
 
 _TITLE = re.compile(r"^\* VOL1DS FILE:")
@@ -92,31 +92,33 @@ def _size(text: Text, first: int) -> tuple[int, float]:
     return samples, 1 / interval(text, line, "sampling rate", rate)
 
 
-def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
+def _station(lines: list[str], epicentre: Words) -> Words:
     """Return code, name, coordinates, instrument and direction of a component."""
-    words = _direction(lines)
-    words["instrument"] = {
-        "model": lines[1].partition("=")[2].strip() or None,
-        **sensor_constants(lines[9]),
-    }
-    # Its code is made from its name
     station = _STATION.match(lines[7])
-    words["station"] = re.sub(r"[^A-Z0-9]", "", (word_in(station) or "").upper())
-    words["station_name"] = word_in(station)
-    words["coordinates"] = station_place(station, epicentre, number_in(station, "elevation"))
-    return words
+    name = word_in(station)
+    # The code is made from the name
+    return {
+        "station": re.sub(r"[^A-Z0-9]", "", (name or "").upper()),
+        "station_name": name,
+        "coordinates": station_place(station, epicentre, number_in(station, "elevation")),
+        "instrument": {
+            "model": lines[1].partition("=")[2].strip() or None,
+            **sensor_constants(lines[9]),
+        },
+        **_direction(lines),
+    }
 
 
-def _direction(lines: list[str]) -> dict[str, Any]:
+def _direction(lines: list[str]) -> dict[str, float]:
     """Return the direction of a component: L and T have azimuths, V is vertical."""
     component = lines[6].removeprefix("COMP").strip()[:1].upper()
     azimuths = dict(_AZIMUTH.findall(lines[7].partition("Azimuth")[2]))
     if component in azimuths:
-        return dict(horizontal(float(azimuths[component])))
+        return horizontal(float(azimuths[component]))
     return {"sensor_dip": -90.0} if component == "V" else {}
 
 
-def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
+def _event(text: Text, first: int, lines: list[str]) -> Words:
     """Return origin time, hypocentre and magnitude (moment, or else the first) of the event."""
     epicentre = _EPICENTRE.match(lines[8])
     # Kinds of magnitude in the order of the line

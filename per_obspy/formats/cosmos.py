@@ -36,6 +36,7 @@ from per_obspy.formats.text.lines import (
     refuse,
 )
 from per_obspy.formats.text.vocabulary import (
+    Words,
     channel_code,
     coordinates,
     orientation,
@@ -222,7 +223,7 @@ def _start(header: _Header) -> UTCDateTime | None:
     return utc(header.text, header.first + 7, "start time", date, clock)
 
 
-def _words(header: _Header) -> dict[str, Any]:
+def _words(header: _Header) -> Words:
     """Return codes, place, instrument and orientation; codes of SEED are in a comment."""
     code = _CODE.search(header.lines[4])
     channel = _CHANNEL.match(header.lines[8])
@@ -247,7 +248,7 @@ def _words(header: _Header) -> dict[str, Any]:
     return words | direction
 
 
-def _instrument(header: _Header) -> dict[str, Any]:
+def _instrument(header: _Header) -> Words:
     """Return model, serial number and constants of the instrument."""
     recorder = _SERIAL.match(header.lines[6])
     frequency, damping, sensitivity = header.reals[39:42]
@@ -261,14 +262,14 @@ def _instrument(header: _Header) -> dict[str, Any]:
     }
 
 
-def _channel_code(header: _Header, words: dict[str, Any], dt: float) -> str:
+def _channel_code(header: _Header, words: Words, dt: float) -> str:
     """Return the SEED channel code; channels without an azimuth have the number of the file."""
     code, number = channel_code(1 / dt, words), int(header.integers[50] or 0)
     is_numbered = number > 0 and (len(code) < 3 or "direction" in words)
     return f"{code[:2]}{number % 10}" if is_numbered else code
 
 
-def _event(header: _Header) -> dict[str, Any]:
+def _event(header: _Header) -> Words:
     """Return name, time, hypocentre and magnitude: moment, else local, else surface wave."""
     origin = _ORIGIN.match(header.lines[3])
     latitude, longitude, depth = header.reals[9:12]

@@ -37,7 +37,13 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import channel_code, orientation, read_components, trace
+from per_obspy.formats.text.vocabulary import (
+    Words,
+    channel_code,
+    orientation,
+    read_components,
+    trace,
+)
 from per_obspy.formats.text.volumes import (
     corrected_blocks,
     is_title,
@@ -109,7 +115,7 @@ _MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*+{DECIMAL}")
 class _Header(NamedTuple):
     """Header of one channel: words, number in the file, real numbers, line after it."""
 
-    words: dict[str, Any]
+    words: Words
     channel: int
     reals: list[float | None]
     next_line: int
@@ -188,7 +194,7 @@ def _end(text: Text, line: int) -> int:
     return line + 1
 
 
-def _trace(values: FloatArray, dt: float, header: _Header, words: dict[str, Any]) -> Trace:
+def _trace(values: FloatArray, dt: float, header: _Header, words: Words) -> Trace:
     """Return acceleration in m/s2; channels without an azimuth are numbered as in the file."""
     code = channel_code(1 / dt, header.words)
     if len(code) < 3 or "direction" in header.words:
@@ -223,7 +229,7 @@ def _read_header(text: Text, first: int, text_lines: int, reals: int) -> _Header
     return _Header(words, int(channel[1]), known, numbers + block_lines(reals, 8))
 
 
-def _words(text: Text, first: int, lines: list[str], channel: Match[str]) -> dict[str, Any]:
+def _words(text: Text, first: int, lines: list[str], channel: Match[str]) -> Words:
     """Return the words of the thirteen lines of text, in capitals."""
     event = _event(text, first, lines)
     model = _MODEL.search(lines[4])
@@ -259,7 +265,7 @@ def _location(site: str, channel: int, station_channel: int) -> str | None:
     return f"{station_channel - channel + 1 if recorder <= 3 else station_channel:02d}"
 
 
-def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
+def _station(lines: list[str], epicentre: Words) -> Words:
     """Return codes, name and coordinates of the station."""
     site = _SITE.match(lines[4].strip())
     name, *owner = re.split(r"\s{2,}|\s+S/N", lines[5].strip())
@@ -291,7 +297,7 @@ def _clock(text: Text, line: int, match: Match[str] | None) -> UTCDateTime | Non
     return header_time(text, line, "time", match)
 
 
-def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
+def _event(text: Text, first: int, lines: list[str]) -> Words:
     """Return name, origin time, hypocentre and magnitude of the event."""
     epicentre = epicentre_place(_EPICENTRE.search(lines[8]))
     depth = scaled(number_in(_DEPTH.search(lines[8])), 1000)

@@ -19,7 +19,13 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, gal_columns, is_direction, orientation
+from per_obspy.formats.text.vocabulary import (
+    Words,
+    coordinates,
+    gal_columns,
+    is_direction,
+    orientation,
+)
 
 _LENGTH = "RecordLength(sec)"
 _TITLE = b"#Earthquake Information"
@@ -86,7 +92,7 @@ def _peak(header: Header, direction: str) -> dict[str, float]:
     return {"header_peak": GAL * max(abs(float(extreme)) for extreme in extremes.groups())}
 
 
-def _common_words(header: Header) -> dict[str, Any]:
+def _common_words(header: Header) -> Words:
     """Return the words that all components share; clocks are eight hours ahead."""
     origin, start = (
         header.time(_TIME, f"{name}(GMT+08)", hours_ahead=_HOURS_AHEAD)

@@ -15,7 +15,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import channel_direction, coordinates, trace
+from per_obspy.formats.text.vocabulary import Words, channel_direction, coordinates, trace
 from per_obspy.units import MotionUnit, motion_unit
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_/^]*:")
@@ -77,7 +77,7 @@ def _unit(header: Header) -> MotionUnit:
     return unit
 
 
-def _station(header: Header) -> dict[str, Any]:
+def _station(header: Header) -> Words:
     """Return codes, name, place, instrument and ground of the station."""
     location = header.word("LOCATION") or ""
     sensor = _MODEL.match(header.word("INSTRUMENT") or "")
@@ -111,7 +111,7 @@ def _ground(header: Header) -> dict[str, str | float | None]:
     return {"site_class": site_class, "vs30": vs30 if vs30 is not None and vs30 > 0 else None}
 
 
-def _processing(header: Header) -> dict[str, Any]:
+def _processing(header: Header) -> Words:
     """Return the corners of the filter, Hz; a record without any was not processed."""
     corners = {}
     for corner, name in (("highpass", "LOW_CUT"), ("lowpass", "HIGH_CUT")):
@@ -122,7 +122,7 @@ def _processing(header: Header) -> dict[str, Any]:
     return {"corners": corners, "processing_level": "processed" if filtered else "raw"}
 
 
-def _event(header: Header) -> dict[str, Any]:
+def _event(header: Header) -> Words:
     """Return name, time, hypocentre and magnitude (moment, or else local) of the event."""
     return {
         "name": header.word("EVENT_NAME"),

@@ -30,7 +30,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import orientation, read_components, trace
+from per_obspy.formats.text.vocabulary import Words, orientation, read_components, trace
 from per_obspy.formats.text.volumes import promised_points, sensor_constants
 
 _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
@@ -121,7 +121,7 @@ def _samples(text: Text, first: int, sizes: list[int]) -> tuple[FloatArray, int]
     return blocks[0], line
 
 
-def _motion(lines: list[str]) -> dict[str, Any]:
+def _motion(lines: list[str]) -> Words:
     """Return corners, peak and direction, as far as the text has them."""
     # The corners lie where the transition bands end: inside the pass band
     return {
@@ -131,7 +131,7 @@ def _motion(lines: list[str]) -> dict[str, Any]:
     }
 
 
-def _station(text: Text, first: int) -> dict[str, Any]:
+def _station(text: Text, first: int) -> Words:
     """Return codes, name, place and instrument of the station, and the event."""
     lines = text.lines[first : first + _TEXT_LINES]
     site = matched(text, first + 1, "site", _SITE, "{} has no code and coordinates")

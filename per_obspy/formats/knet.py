@@ -1,12 +1,10 @@
 """K-NET and KiK-net: ObsPy reads them; their header is put into the words of the vocabulary."""
 
-from typing import Any
-
 from obspy import Trace
 
 from per_obspy.constants import GAL
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.vocabulary import coordinates, orientation
+from per_obspy.formats.text.vocabulary import Words, coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
 _SENSORS = "12"
@@ -39,7 +37,7 @@ def with_knet_words(record: Trace) -> Trace:
     return trace
 
 
-def knet_event(record: Trace) -> dict[str, Any]:
+def knet_event(record: Trace) -> Words:
     """
     Return the event of a K-NET header, in the words of the vocabulary.
 

@@ -27,7 +27,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import gal_columns, is_direction, orientation
+from per_obspy.formats.text.vocabulary import Words, gal_columns, is_direction, orientation
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
@@ -69,7 +69,7 @@ def _directions(text: Text) -> list[str]:
     return directions
 
 
-def _common_words(header: Header) -> dict[str, Any]:
+def _common_words(header: Header) -> Words:
     """Return the words that all components share."""
     place = epicentre_place(_PLACE.search(header.word("EPICENTER COORDINATES") or ""))
     # The kind of the magnitude follows its number

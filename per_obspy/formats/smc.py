@@ -22,10 +22,10 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import Words, coordinates, horizontal, trace
 from per_obspy.formats.text.volumes import Film, read_film
 
-_TEXT_LINES, _INTEGER_LINES, _NUMBER_LINES = 11, 6, 16
+_TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 11, 6, 27
 _INTEGERS, _REALS = 48, 50
 _WIDTH, _PER_LINE = 10, 8  # of integers and samples
 _NO_INTEGER, _NO_REAL = -32768, 1e38
@@ -52,6 +52,7 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     """Read SMC: one component, m/s2, m/s or m."""
     text = read_text(file)
     title = matched(text, 0, "title", _TITLE, "{} is not that of a time series")[1]
+    line_at(text, _TEXT_LINES, "integers")
     # Integers and reals of the header, where they are known
     whole = fixed_block(text, _TEXT_LINES, _INTEGERS, _WIDTH, _PER_LINE)
     real = fixed_block(text, _TEXT_LINES + _INTEGER_LINES, _REALS, 15, 5)
@@ -59,7 +60,7 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     reals = [float(number) if abs(number) < _NO_REAL else None for number in real]
     samples = count(text, _TEXT_LINES + 2, "number of samples", f"{whole[16]:.17g}")
     # Samples follow the comments
-    first = _TEXT_LINES + _NUMBER_LINES + max(integers[15] or 0, 0)
+    first = _HEADER_LINES + max(integers[15] or 0, 0)
     values, dt, film = _samples(text, first, samples, title, float(real[1]))
     words = _station(text, integers, reals) | _motion(text, integers, reals) | film
     return Stream([trace(_CENTIMETRE * values, dt, words | _KINDS[title], text.name)])
@@ -67,7 +68,7 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
 
 def _samples(
     text: Text, first: int, samples: int, title: str, rate: float
-) -> tuple[FloatArray, float, dict[str, Any]]:
+) -> tuple[FloatArray, float, Words]:
     """Return the samples, their interval, s, and the words of film: uncorrected without a rate."""
     if title == _RAW and not abs(rate) < _NO_REAL:
         return _film(text, first, samples)[:3]
@@ -94,7 +95,7 @@ def _film(text: Text, first: int, samples: int) -> Film:
     return film
 
 
-def _station(text: Text, integers: list[int | None], reals: list[float | None]) -> dict[str, Any]:
+def _station(text: Text, integers: list[int | None], reals: list[float | None]) -> Words:
     """Return codes, name, place and instrument of the station."""
     model = _MODEL.match(text.lines[7])
     # Where the station has no number, its code is in the text
@@ -112,7 +113,7 @@ def _station(text: Text, integers: list[int | None], reals: list[float | None]) 
     }
 
 
-def _motion(text: Text, integers: list[int | None], reals: list[float | None]) -> dict[str, Any]:
+def _motion(text: Text, integers: list[int | None], reals: list[float | None]) -> Words:
     """Return time, filter, peak, event and direction of a record."""
     peaks = [abs(extreme) for extreme in (reals[29], reals[31]) if extreme is not None]
     # Numbers that are unknown are dropped from the trace

@@ -35,7 +35,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import gal_columns, orientation
+from per_obspy.formats.text.vocabulary import Words, gal_columns, orientation
 
 _MARK = b"ARCHIVO ESTANDAR DE ACELERACION"
 _WIDTH = 10
@@ -194,7 +194,7 @@ def _direction(words: str) -> dict[str, float]:
     return direction
 
 
-def _common_words(header: Header) -> dict[str, Any]:
+def _common_words(header: Header) -> Words:
     """
     Return the words that all channels share.
 

@@ -25,7 +25,7 @@ from per_obspy.formats.text.lines import (
     matched,
     read_text,
 )
-from per_obspy.formats.text.vocabulary import orientation, read_components, trace
+from per_obspy.formats.text.vocabulary import Words, orientation, read_components, trace
 from per_obspy.formats.text.volumes import (
     corrected_blocks,
     promised_points,
@@ -94,7 +94,7 @@ def _volume_2(text: Text, first: int) -> tuple[Trace, int]:
     return trace(GAL * values, dt, words), line
 
 
-def _words(text: Text, first: int) -> dict[str, Any]:
+def _words(text: Text, first: int) -> Words:
     """Return the words of the lines that both volumes share."""
     lines = text.lines[first : first + 13]
     matched(text, first, "title", _VOLUME_1, "{} is not that of a component")

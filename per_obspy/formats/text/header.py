@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from obspy import UTCDateTime
 
 from per_obspy.formats.text.lines import NUMBER, Text, count, finite_number, interval, refuse
-from per_obspy.formats.text.vocabulary import coordinates
+from per_obspy.formats.text.vocabulary import Words, coordinates
 
 #: first letters of months in English and Spanish
 _MONTHS = "JAN FEB MAR APR MAY JUN JUL AUG SEP OCT NOV DEC"
@@ -263,7 +263,7 @@ def place_pattern(angle: str, between: str) -> str:
     )
 
 
-def epicentre_place(match: Match[str] | None) -> dict[str, Any]:
+def epicentre_place(match: Match[str] | None) -> Words:
     """
     Return the coordinates of an epicentre, degrees; empty where they are unknown.
 
@@ -279,7 +279,7 @@ def epicentre_place(match: Match[str] | None) -> dict[str, Any]:
 
 def station_place(
     match: Match[str] | None, epicentre: Mapping[str, Any], elevation: float | None = None
-) -> dict[str, Any]:
+) -> Words:
     """
     Return the coordinates of a station; empty where they are unknown.
 

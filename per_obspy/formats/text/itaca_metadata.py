@@ -8,12 +8,13 @@ names the fields, one line holds their values.
 import csv
 import re
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from obspy import UTCDateTime
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.text.station_table import StationRow, bare_name, number_within
+from per_obspy.formats.text.vocabulary import Words
 
 _MARK = b"event.ev_sourcedb.shortname,"
 
@@ -47,7 +48,7 @@ class ItacaMetadata(NamedTuple):
     """
 
     row: StationRow
-    event: dict[str, Any]
+    event: Words
 
 
 def is_itaca_metadata(start: bytes) -> bool:
@@ -108,9 +109,9 @@ def _fields(name: str, text: str) -> dict[str, str]:
     return {field.strip(): value.strip() for field, value in zip(*rows, strict=True)}
 
 
-def _event(name: str, time: str, numbers: dict[str, float]) -> dict[str, Any]:
+def _event(name: str, time: str, numbers: dict[str, float]) -> Words:
     """Return time, hypocentre and magnitude of the event, as far as they are known."""
-    event: dict[str, Any] = {
+    event: Words = {
         word: factor * numbers[f"event.{field}"]
         for word, field, factor in (
             ("latitude", "latitude", 1.0),

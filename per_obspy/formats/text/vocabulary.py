@@ -65,6 +65,9 @@ from per_obspy.constants import (
 )
 from per_obspy.formats.text.lines import Text
 
+#: words of the vocabulary -> their values
+Words = dict[str, Any]
+
 #: words that can name a file
 _CODES = {"network", "station", "location", "channel"}
 
@@ -90,7 +93,7 @@ _BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
 _AXIS_TOLERANCE = 5
 
 
-def orientation(words: str) -> dict[str, Any]:
+def orientation(words: str) -> Words:
     """
     Return ``sensor_azimuth``, ``sensor_dip``, ``direction`` of ``N21E``, ``NS``, ``UP``, ``LONG``.
 
@@ -122,7 +125,7 @@ def orientation(words: str) -> dict[str, Any]:
     return _without_azimuth(re.sub(r"[^A-Z0-9]+", "", word))
 
 
-def _without_azimuth(word: str) -> dict[str, Any]:
+def _without_azimuth(word: str) -> Words:
     """Return the direction of a word that has no azimuth."""
     if not word:
         return {}
@@ -148,7 +151,7 @@ def _letter(word: str) -> str:
     return word[-1] if re.fullmatch(SEED_CODE, word) or word in _NUMBERS else ""
 
 
-def channel_direction(code: str) -> dict[str, Any]:
+def channel_direction(code: str) -> Words:
     """
     Return the direction of a channel code, of which N and E are azimuths as well.
 
@@ -160,7 +163,7 @@ def channel_direction(code: str) -> dict[str, Any]:
     return orientation(code)
 
 
-def file_direction(name: str) -> dict[str, Any]:
+def file_direction(name: str) -> Words:
     """
     Return the direction at the end of a file's name, for headers that have none.
 
@@ -238,7 +241,7 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = 
     file : str, optional
         Name of a file of one component, whose end may be a direction.
     """
-    header: dict[str, Any] = {"units": "m/s2", "quantity": "acceleration", **words}
+    header: Words = {"units": "m/s2", "quantity": "acceleration", **words}
     # Notes of the reader and of the place
     place = dict(header.get("coordinates") or {})
     notes = [*header.pop("notes", ()), place.pop("problem", None)]
@@ -257,9 +260,9 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = 
     return Trace(data=np.ascontiguousarray(samples), header={"delta": dt, **header})
 
 
-def _without_unknowns(words: Mapping[str, Any]) -> dict[str, Any]:
+def _without_unknowns(words: Mapping[str, Any]) -> Words:
     """Return words that are not None; groups become attributes, empty ones are left out."""
-    known: dict[str, Any] = {}
+    known: Words = {}
     for name, word in words.items():
         if isinstance(word, Mapping):
             group = AttribDict(_without_unknowns(word))
@@ -299,7 +302,7 @@ def read_components(text: Text, read_component: Callable[[Text, int], tuple[Trac
 
 def coordinates(
     latitude: float | None, longitude: float | None, elevation: float | None = None
-) -> dict[str, Any]:
+) -> Words:
     """
     Return the group of coordinates, degrees and m.
 

@@ -7,7 +7,7 @@ digitised film: times and values in turn, seven characters each, five pairs per 
 
 import re
 from re import Pattern
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from per_obspy.formats.text.lines import (
     matched,
     refuse,
 )
+from per_obspy.formats.text.vocabulary import Words
 
 _TITLE = re.compile(
     rf"\s*+(\d{{1,12}})\s++(?:ACCELEROGRAM )?POINTS\b.*?\bAT\s++{DECIMAL}\s*+(PTS/SEC|SEC)\b"
@@ -154,7 +155,7 @@ class Film(NamedTuple):
 
     values: FloatArray
     dt: float
-    words: dict[str, Any]
+    words: Words
     next_line: int
 
 
