@@ -6,7 +6,7 @@ import pytest
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.inventory.files.writing import write_pairs
-from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.simulation.buildings import simulated_pairs
 
 
 @pytest.mark.parametrize("name", ["pairs.csv", "pairs.parquet"])
