@@ -44,6 +44,7 @@ _TITLE = re.compile(
     r"(?:\s++\d{1,2}:?\d{2})?\s*+,(?P<station>.*),(?P<component>[^,]*+)"
 )
 #: corners in the units line: HP=0.1 Hz LP=30.0 Hz
+_CORNERS = {"H": "highpass", "L": "lowpass"}
 _POINTS = re.compile(r"\b([HL])P\s*+=\s*+(\d{1,20}\.?\d{0,20}|\.\d{1,20})\s*+HZ")
 #: corners in the line of sizes: 5 POLE @ 30.00000 HZ, -5 POLE @ .10000 HZ; a high-pass filter has
 #: a negative number of poles, and the line may end before the last unit
@@ -108,9 +109,8 @@ def _title(text: Text) -> Words:
 
 def _corners(text: Text) -> dict[str, float]:
     """Return the corners of PEER's filter that the header has, Hz; none that contradict."""
-    corners = {}
-    for letter, corner in _POINTS.findall(text.lines[2].upper()):
-        corners["highpass" if letter == "H" else "lowpass"] = float(corner)
+    points = _POINTS.findall(text.lines[2].upper())
+    corners = {_CORNERS[letter]: float(corner) for letter, corner in points}
     for sign, poles, corner in _POLES.findall(text.lines[3].upper()):
         # No poles: no filter was applied here, but a low-pass corner may be that of earlier
         # processing, as of digitized film; the cautious answer keeps it

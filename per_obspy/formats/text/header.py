@@ -271,9 +271,7 @@ def epicentre_place(match: Match[str] | None) -> Words:
     >>> epicentre_place(re.match(pattern, "34.0N 118.0N"))
     {}
     """
-    if match is None:
-        return {}
-    place = coordinates(*[_signed(*angle) for angle in _angles(match)])
+    place = station_place(match, {})
     return {} if "problem" in place else place
 
 

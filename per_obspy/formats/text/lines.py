@@ -19,6 +19,9 @@ WaveformFile = str | Path | BinaryIO
 #: characters of a decimal number; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
+#: what may follow the last line
+_PADDING = b"\x00\x1a\r\n "
+
 #: largest numbers of characters of a line and a number; damaged files may have millions
 LONGEST_LINE, LONGEST_NUMBER = 2000, 40
 
@@ -80,7 +83,9 @@ def read_text(file: WaveformFile) -> Text:
         name, content = str(getattr(file, "name", "open file")), file.read()
     else:
         name, content = str(file), Path(file).read_bytes()
-    text = Text(name, _lines(content), is_ended(content))
+    # A byte ends the last word of a whole file; zeros may fill a place that was never cut
+    padding = content[len(content.rstrip(_PADDING)) :]
+    text = Text(name, _lines(content), bool(padding.strip(b"\x00")))
     # Searching and padding take time and memory that grow with the longest line
     for line, row in enumerate(text.lines):
         if len(row) > LONGEST_LINE:
@@ -88,19 +93,8 @@ def read_text(file: WaveformFile) -> Text:
     return text
 
 
-def is_ended(content: bytes) -> bool:
-    r"""
-    Check whether a byte ends the last word of a file; zeros may fill a place that was never cut.
-
-    >>> is_ended(b"0.12\r\n"), is_ended(b"0.1"), is_ended(b"0.1\0\0")
-    (True, False, False)
-    """
-    padding = content[len(content.rstrip(b"\x00\x1a\r\n ")) :]
-    return bool(padding.strip(b"\x00"))
-
-
 def _lines(content: bytes) -> list[str]:
-    text = content.decode("latin-1").rstrip("\x00\x1a\r\n ")
+    text = content.rstrip(_PADDING).decode("latin-1")
     return text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
@@ -301,8 +295,6 @@ def free_block(text: Text, start: int, samples: int) -> FloatArray:
 
 def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
     """Refuse a last number that ends at another place of its column than the others."""
-    if not text.is_ended and (len(rows[-1]) - len(rows[0][:width].rstrip())) % width:
-        _refuse_cut(text, f"{rows[-1][-width:]!r} ends before its column")
     *cells, last = [
         row[first : first + width].rstrip()
         for row in rows[-_COMPARED:]
@@ -310,7 +302,8 @@ def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
     ]
     # Numbers at the right of their columns all end at one place; at the left, their forms tell
     ends = {len(cell) for cell in cells}
-    if (len(ends) == 1 and len(last) < min(ends)) or _is_short(last, cells):
+    is_early = not text.is_ended and (len(rows[-1]) - len(rows[0][:width].rstrip())) % width
+    if is_early or (len(ends) == 1 and len(last) < min(ends)) or _is_short(last, cells):
         _refuse_cut(text, f"{last!r} ends before its column")
 
 
@@ -320,13 +313,13 @@ def _refuse_another_form(text: Text, rows: list[str]) -> None:
     endings = [row.split()[-1] for row in filled]
     forms = {_form(word) for word in endings}
     # Whole numbers have no form that shows their end
-    if not text.is_ended and (len(forms) > 1 or forms == {(-1, 0)}):
-        _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
+    is_doubtful = not text.is_ended and (len(forms) > 1 or forms == {(-1, 0)})
     # Numbers of the same place in their lines
     place = len(filled[-1].split()) - 1
     above = [row for row in filled[-_COMPARED:-1] if len(row.split()) > place]
     others = [row.split()[place] for row in above] or filled[-1].split()[:-1]
-    if _is_short(endings[-1], others) or _ends_early(filled[-1], above, place):
+    is_doubtful |= _ends_early(filled[-1], above, place)
+    if is_doubtful or _is_short(endings[-1], others):
         _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
 
 
