@@ -122,7 +122,6 @@ class _Rows(NamedTuple):
 
     goes_on: NDArray[np.bool_]  # building 1 of the pair is building 2 of the pair before
     turns: NDArray[np.bool_]  # and that around a corner
-    place: NDArray[np.int64]  # of the pair in its row, from 0
     start: NDArray[np.int64]  # first pair of its row
 
 
@@ -132,9 +131,8 @@ def _rows(seed: int, count: int) -> _Rows:
     chance = np.random.default_rng([seed, 1]).random(count)
     goes_on = chance < STRAIGHT + CORNER
     goes_on[0] = False
-    number = np.arange(count)
-    start = np.maximum.accumulate(np.where(goes_on, 0, number))
-    return _Rows(goes_on, goes_on & (chance >= STRAIGHT), number - start, start)
+    start = np.maximum.accumulate(np.where(goes_on, 0, np.arange(count)))
+    return _Rows(goes_on, goes_on & (chance >= STRAIGHT), start)
 
 
 def _names(rows: _Rows) -> Columns:
@@ -143,18 +141,16 @@ def _names(rows: _Rows) -> Columns:
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
     straight = rows.goes_on & ~rows.turns
     inside = straight & np.append(straight[1:], False)
-    numbers = {
-        "pair_id": ("P", np.arange(1, last.size + 1)),
-        "building_id_1": ("B", last - 1),
-        "building_id_2": ("B", last),
-    }
     return {
+        "pair_id": _identifiers("P", np.arange(1, last.size + 1)),
+        "building_id_1": _identifiers("B", last - 1),
+        "building_id_2": _identifiers("B", last),
         "position": np.where(inside, POSITIONS[1], POSITIONS[0]),
-        **{
-            name: np.array([f"{letter}{number:07d}" for number in values.tolist()])
-            for name, (letter, values) in numbers.items()
-        },
     }
+
+
+def _identifiers(letter: str, numbers: NDArray[np.int64]) -> NDArray[np.str_]:
+    return np.array([f"{letter}{number:07d}" for number in numbers.tolist()])
 
 
 def _lognormal(
@@ -167,7 +163,7 @@ def _lognormal(
 
 def _buildings(generator: np.random.Generator, rows: _Rows) -> Columns:
     """Return sizes, systems, measured periods and dampings of both buildings of each pair."""
-    count = rows.place.size
+    count = rows.start.size
     storeys, height, system = _sizes(generator, rows)
     area = np.round(_lognormal(generator, count, *AREA))
     # Measured values, NaN where the building was not measured
@@ -196,7 +192,7 @@ def _sizes(generator: np.random.Generator, rows: _Rows) -> tuple[FloatArray, Flo
 
     Building 2 often repeats the size or the system of building 1.
     """
-    count = rows.place.size
+    count = rows.start.size
     storeys = np.clip(np.rint(_lognormal(generator, count, *STOREYS)), 1, MOST_STOREYS)
     storey_height = np.round(generator.normal(*STOREY_HEIGHT, (2, count)), 1)
     storey_height = storey_height.clip(*STOREY_HEIGHTS)
@@ -205,14 +201,11 @@ def _sizes(generator: np.random.Generator, rows: _Rows) -> tuple[FloatArray, Flo
     is_equal = generator.random(count) < EQUAL
     has_same_system = generator.random(count) < SAME_SYSTEM
     alike = ((storeys, is_equal), (storey_height, is_equal), (system, has_same_system))
-    # From the first pair of each row to its last, each begins with the building before
-    for place in range(int(rows.place.max()) + 1):
-        here = np.flatnonzero(rows.place == place)
-        for values, is_alike in alike:
-            if place:
-                values[0, here] = values[1, here - 1]
-            same = here[is_alike[here]]
-            values[1, same] = values[0, same]
+    # The last pair of the row that chose, whose building the following repeat
+    for values, is_alike in alike:
+        chosen = np.where(rows.goes_on & is_alike, 0, np.arange(count))
+        origin = np.maximum.accumulate(chosen)
+        values[1] = np.where(is_alike[origin], values[0, origin], values[1, origin])
     return storeys, (storeys * storey_height).round(1), system
 
 
@@ -230,7 +223,7 @@ def _places(
     radius: float,
 ) -> Columns:
     """Return positions and azimuths in degrees; each station's neighbourhood has a street grid."""
-    count = rows.place.size
+    count = rows.start.size
     # Pairs of a row are around one station
     station = generator.integers(len(stations), size=count)[rows.start]
     azimuth = _azimuths(generator, station, len(stations), rows)
