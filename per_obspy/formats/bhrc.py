@@ -12,7 +12,7 @@ from per_obspy.formats.text.header import (
     header_time,
     number_in,
     place_pattern,
-    scaled,
+    scale,
     station_place,
     word_in,
 )
@@ -28,7 +28,7 @@ from per_obspy.formats.text.lines import (
     head,
     interval,
     line_at,
-    matched,
+    match_line,
     read_text,
     refuse,
 )
@@ -65,12 +65,12 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     """Return a component and the line after it."""
     start = first + _HEADER_LINES
     line_at(text, start, "samples")
-    matched(text, first, "title", _TITLE, "{} is not that of a component")
-    matched(text, first + _UNIT_LINE, "unit", _UNIT, "{} is not g/10")
+    match_line(text, first, "title", _TITLE, "{} is not that of a component")
+    match_line(text, first + _UNIT_LINE, "unit", _UNIT, "{} is not g/10")
     samples, dt = _size(text, first)
     values = STANDARD_GRAVITY / 10 * fixed_block(text, start, samples, _WIDTH, _PER_LINE)
     end = start + block_lines(samples, _PER_LINE)
-    matched(text, end, "end of component", _END, "expected '/&' after the samples, got {}")
+    match_line(text, end, "end of component", _END, "expected '/&' after the samples, got {}")
     # Words of the header
     lines = text.lines[first:start]
     event = _event(text, first, lines)
@@ -80,7 +80,7 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
 
 def _size(text: Text, first: int) -> tuple[int, float]:
     """Return the number of samples and their interval, s; the rate must fit the duration."""
-    points = matched(text, first + _POINTS_LINE, "number of points", _POINTS)
+    points = match_line(text, first + _POINTS_LINE, "number of points", _POINTS)
     samples = count(text, first + _POINTS_LINE, "number of points", points[1])
     # The rate is on a separate line among the numbers
     line = first + _RATE_LINE
@@ -96,6 +96,12 @@ def _station(lines: list[str], epicentre: Words) -> Words:
     """Return code, name, coordinates, instrument and direction of a component."""
     station = _STATION.match(lines[7])
     name = word_in(station)
+    azimuths = dict(_AZIMUTH.findall(lines[7].partition("Azimuth")[2]))
+    # L and T have azimuths, V is vertical
+    component = lines[6].removeprefix("COMP").strip()[:1].upper()
+    direction = {"sensor_dip": -90.0} if component == "V" else {}
+    if component in azimuths:
+        direction = horizontal(float(azimuths[component]))
     # The code is made from the name
     return {
         "station": re.sub(r"[^A-Z0-9]", "", (name or "").upper()),
@@ -105,17 +111,8 @@ def _station(lines: list[str], epicentre: Words) -> Words:
             "model": lines[1].partition("=")[2].strip() or None,
             **sensor_constants(lines[9]),
         },
-        **_direction(lines),
+        **direction,
     }
-
-
-def _direction(lines: list[str]) -> dict[str, float]:
-    """Return the direction of a component: L and T have azimuths, V is vertical."""
-    component = lines[6].removeprefix("COMP").strip()[:1].upper()
-    azimuths = dict(_AZIMUTH.findall(lines[7].partition("Azimuth")[2]))
-    if component in azimuths:
-        return horizontal(float(azimuths[component]))
-    return {"sensor_dip": -90.0} if component == "V" else {}
 
 
 def _event(text: Text, first: int, lines: list[str]) -> Words:
@@ -126,6 +123,6 @@ def _event(text: Text, first: int, lines: list[str]) -> Words:
     return {
         "time": header_time(text, first + 2, "origin time", _TIME.match(lines[2])),
         **epicentre_place(epicentre),
-        "depth": scaled(number_in(epicentre, "depth"), 1000),
+        "depth": scale(number_in(epicentre, "depth"), 1000),
         "magnitude": magnitudes.get("Mw", next(iter(magnitudes.values()), None)),
     }

@@ -17,7 +17,7 @@ from per_obspy.formats.text.header import (
     first_known,
     header_time,
     number_in,
-    scaled,
+    scale,
     utc,
     word_in,
 )
@@ -30,8 +30,8 @@ from per_obspy.formats.text.lines import (
     fixed_block,
     head_lines,
     line_at,
-    matched,
-    quoted,
+    match_line,
+    quote,
     read_text,
     refuse,
 )
@@ -110,13 +110,13 @@ def read_cosmos(file: WaveformFile, **_unused: Any) -> Stream:
 
 def _channel(text: Text, first: int) -> tuple[Trace, int]:
     """Return a channel and the line after it."""
-    title = matched(text, first, "title", _TITLE, "{} is not that of a COSMOS time series")
+    title = match_line(text, first, "title", _TITLE, "{} is not that of a COSMOS time series")
     header = _read_header(text, first, count(text, first, "text lines", title[3]))
     unit, factor, values, dt, end = _samples(header)
-    matched(text, end, "end of data", _END, "expected it after the samples, got {}")
+    match_line(text, end, "end of data", _END, "expected it after the samples, got {}")
     # Words of the header
     words = _words(header) | {"starttime": _start(header), "event": _event(header)}
-    words |= {"units": unit, "quantity": title[2], "header_peak": scaled(header.reals[63], factor)}
+    words |= {"units": unit, "quantity": title[2], "header_peak": scale(header.reals[63], factor)}
     words["processing_level"] = "processed" if title[1] == "Corrected" else "raw"
     words.setdefault("channel", _channel_code(header, words, dt))
     # Counts have a gain, all else may have been filtered
@@ -136,7 +136,7 @@ def _read_header(text: Text, first: int, text_lines: int) -> _Header:
     reals, line = _numbers(text, line, "Real")
     # A line announces the number of comments, which may be 0
     problem = "{} does not contain the number of lines that follow"
-    stop = line + 1 + int(matched(text, line, "comments", _COMMENTS, problem)[1])
+    stop = line + 1 + int(match_line(text, line, "comments", _COMMENTS, problem)[1])
     line_at(text, stop, "samples")
     lines, comments = text.lines[first : first + text_lines], text.lines[line + 1 : stop]
     return _Header(text, first, lines, integers, reals, comments, stop)
@@ -145,7 +145,7 @@ def _read_header(text: Text, first: int, text_lines: int) -> _Header:
 def _numbers(text: Text, line: int, kind: str) -> tuple[list[float | None], int]:
     """Return the 100 integers or reals of a header, None where unknown, and the line after them."""
     problem = "{} does not announce its values and format"
-    title = matched(text, line, f"{kind.lower()} header", _HEADER_NUMBERS[kind], problem)
+    title = match_line(text, line, f"{kind.lower()} header", _HEADER_NUMBERS[kind], problem)
     values, next_line = _block(text, line, 100, title.groups())
     return [None if value == _UNKNOWN else value for value in values.tolist()], next_line
 
@@ -154,7 +154,7 @@ def _samples(header: _Header) -> tuple[str, float, FloatArray, float, int]:
     """Return unit and factor to it, samples, interval, s, and the line after the samples."""
     text, line = header.text, header.next_line
     problem = "{} announces no number, duration, unit and format"
-    announced = matched(text, line, "samples", _SAMPLES, problem)
+    announced = match_line(text, line, "samples", _SAMPLES, problem)
     samples, seconds, unit, *layout = announced.groups()
     # The unit may be counts, which have a gain
     name, factor = _unit(text, line, unit)
@@ -178,7 +178,7 @@ def _unit(text: Text, line: int, name: str) -> tuple[str, float]:
         return "counts", 1.0
     unit = motion_unit(name)
     if unit is None:
-        problem = f"{quoted(text, line)} is none of counts, g, gal, cm/sec2, cm/sec, cm"
+        problem = f"{quote(text, line)} is none of counts, g, gal, cm/sec2, cm/sec, cm"
         refuse(text, line, "units", problem)
     return unit.name, unit.factor
 
@@ -279,6 +279,6 @@ def _event(header: _Header) -> Words:
         "time": header_time(header.text, header.first + 3, "origin time", origin),
         "latitude": latitude,
         "longitude": longitude,
-        "depth": scaled(depth, 1000),
+        "depth": scale(depth, 1000),
         "magnitude": first_known(header.reals[index] for index in (12, 14, 13)),
     }

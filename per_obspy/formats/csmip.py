@@ -19,7 +19,7 @@ from per_obspy.formats.text.header import (
     header_time,
     number_in,
     place_pattern,
-    scaled,
+    scale,
     station_place,
     word_in,
 )
@@ -33,7 +33,7 @@ from per_obspy.formats.text.lines import (
     head,
     head_lines,
     line_at,
-    matched,
+    match_line,
     read_text,
     refuse,
 )
@@ -157,10 +157,10 @@ def read_volume_2(file: WaveformFile, **_unused: Any) -> Stream:
 def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
     """Return a channel of uncorrected acceleration and the line after its end."""
     header = _read_header(text, first, _VOLUME_1_LINES, _VOLUME_1_REALS)
-    unit = matched(text, first + 11, "unit", _UNITS, "{} is neither g nor g/10")[1].upper()
+    unit = match_line(text, first + 11, "unit", _UNITS, "{} is neither g nor g/10")[1].upper()
     samples = promised_points(text, first + 10)
     # The header's peak is in g, whatever the unit of the samples
-    words = {"processing_level": "raw", "header_peak": scaled(header.reals[6], STANDARD_GRAVITY)}
+    words = {"processing_level": "raw", "header_peak": scale(header.reals[6], STANDARD_GRAVITY)}
     line = header.next_line
     # Even samples have a title; film has none
     if is_title(line_at(text, line, "samples")):
@@ -177,20 +177,20 @@ def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
 def _volume_2_channel(text: Text, first: int) -> tuple[Trace, int]:
     """Return a channel of corrected acceleration and the line after its end."""
     header = _read_header(text, first + 1, _VOLUME_2_LINES, _VOLUME_2_REALS)
-    matched(text, header.next_line, "unit", _CORRECTED_UNIT, "{} does not name cm/sec2")
+    match_line(text, header.next_line, "unit", _CORRECTED_UNIT, "{} does not name cm/sec2")
     values, dt, line = corrected_blocks(text, header.next_line, ("ACCEL", "VELOC", "DISPL"))
     # Corners in Hz, peak in gal
     words = {
         "processing_level": "processed",
         "corners": {"highpass": header.reals[61], "lowpass": header.reals[72]},
-        "header_peak": scaled(header.reals[65], GAL),
+        "header_peak": scale(header.reals[65], GAL),
     }
     return _trace(GAL * values, dt, header, words), _end(text, line)
 
 
 def _end(text: Text, line: int) -> int:
     """Return the line after the mark that ends a channel."""
-    matched(text, line, "end of channel", _END, "expected '/&' after the samples, got {}")
+    match_line(text, line, "end of channel", _END, "expected '/&' after the samples, got {}")
     return line + 1
 
 
@@ -300,7 +300,7 @@ def _clock(text: Text, line: int, match: Match[str] | None) -> UTCDateTime | Non
 def _event(text: Text, first: int, lines: list[str]) -> Words:
     """Return name, origin time, hypocentre and magnitude of the event."""
     epicentre = epicentre_place(_EPICENTRE.search(lines[8]))
-    depth = scaled(number_in(_DEPTH.search(lines[8])), 1000)
+    depth = scale(number_in(_DEPTH.search(lines[8])), 1000)
     # Moment magnitude, or else the first that is above zero
     sizes = [(kind, float(size)) for kind, size in _MAGNITUDE.findall(lines[8])]
     magnitudes = {kind: size for kind, size in sizes if size > 0}
@@ -350,7 +350,7 @@ def read_spectra(file: WaveformFile) -> tuple[OfficialSpectra, ...]:
         If the file is not a volume 3 or lacks parts that its header announces.
     """
     text = read_text(file)
-    matched(text, 0, "title", _VOLUME_3, "{} is not that of a volume 3")
+    match_line(text, 0, "title", _VOLUME_3, "{} is not that of a volume 3")
     # A channel ends as those of the other volumes do
     spectra, line = [], 0
     while line < len(text.lines):
@@ -373,7 +373,7 @@ def _spectra_channel(text: Text, first: int) -> tuple[OfficialSpectra, int]:
     values = np.empty((_ARRAYS, dampings, periods))
     for index, fraction in enumerate(damping):
         problem = f"expected the spectra of {fraction:g}, got {{}}"
-        matched(text, line, "damping", _DAMPING, problem)
+        match_line(text, line, "damping", _DAMPING, problem)
         for kind in range(_ARRAYS):
             values[kind, index] = _slots(text, line + 1 + kind * _SLOT_LINES, periods)
         line += _ARRAYS * _SLOT_LINES + 1

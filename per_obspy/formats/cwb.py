@@ -8,7 +8,7 @@ from obspy import Stream
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL
-from per_obspy.formats.text.header import CLOCK, Header, read_fields, scaled
+from per_obspy.formats.text.header import CLOCK, Header, read_fields, scale
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -54,7 +54,7 @@ def read_cwb(file: WaveformFile, **_unused: Any) -> Stream:
     # The length of the record gives the number of samples
     dt = 1 / header.interval("SampleRate(Hz)")
     seconds = header.interval(_LENGTH)
-    samples = count(text, header.fields[_LENGTH].line, _LENGTH, str(round(seconds / dt)))
+    samples = count(text, header.line(_LENGTH), _LENGTH, str(round(seconds / dt)))
     # Columns of time and three components
     table = free_block(text, first, 4 * samples).reshape(-1, 4)
     _check_times(text, first, table[:, 0], dt)
@@ -64,15 +64,13 @@ def read_cwb(file: WaveformFile, **_unused: Any) -> Stream:
 
 def _directions(header: Header) -> tuple[str, ...]:
     """Return the directions of the columns after time, which must be in gal."""
-    unit = header.required("AmplitudeUnit")
-    columns = header.required("DataSequence")
-    if not unit.value.startswith("gal"):
-        refuse(header.text, unit.line, "AmplitudeUnit", f"{unit.value!r} is not gal")
+    unit, columns = header.required("AmplitudeUnit"), header.required("DataSequence")
+    if not unit.startswith("gal"):
+        header.refuse("AmplitudeUnit", f"{unit!r} is not gal")
     # All three must be directions
-    names = _COLUMNS.match(columns.value)
+    names = _COLUMNS.match(columns)
     if names is None or not all(is_direction(orientation(name)) for name in names.groups()):
-        problem = f"{columns.value!r} is not time and three directions"
-        refuse(header.text, columns.line, "DataSequence", problem)
+        header.refuse("DataSequence", f"{columns!r} is not time and three directions")
     return names.groups()
 
 
@@ -108,11 +106,11 @@ def _common_words(header: Header) -> Words:
     # Depth becomes metres
     return {
         "network": "TW",
-        "station": header.required("StationCode").value,
+        "station": header.required("StationCode"),
         "station_name": header.word("StationName"),
         "coordinates": coordinates(**place),
         "instrument": header.words(model="InstrumentKind"),
         "starttime": start,
         "processing_level": "raw",
-        "event": {**hypocentre, "time": origin, "depth": scaled(hypocentre["depth"], 1000)},
+        "event": {**hypocentre, "time": origin, "depth": scale(hypocentre["depth"], 1000)},
     }

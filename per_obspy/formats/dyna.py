@@ -5,7 +5,7 @@ from typing import Any
 
 from obspy import Stream
 
-from per_obspy.formats.text.header import Header, first_known, read_fields, scaled, word_in
+from per_obspy.formats.text.header import Header, first_known, read_fields, scale, word_in
 from per_obspy.formats.text.lines import (
     NUMBER,
     Text,
@@ -58,22 +58,20 @@ def read_component(text: Text, first: int) -> Stream:
     # The format has no azimuths, only the channel
     words |= channel_direction(words["channel"] or "")
     words["starttime"] = header.time(_TIME, "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS")
-    peak = scaled(header.number("PGA_CM/S^2"), 0.01)
+    peak = scale(header.number("PGA_CM/S^2"), 0.01)
     words["header_peak"] = peak if unit.name == "m/s2" else None
     return Stream([trace(values, dt, words, text.name)])
 
 
 def _unit(header: Header) -> MotionUnit:
     """Return the unit of the samples, which must fit the quantity."""
-    line, name = header.required("UNITS")
-    kind = header.required("DATA_TYPE")
+    name, kind = header.required("UNITS"), header.required("DATA_TYPE")
     unit = motion_unit(name)
     if unit is None:
-        refuse(header.text, line, "UNITS", f"{name!r} is none of cm/s^2, m/s^2, g, cm/s, cm")
+        header.refuse("UNITS", f"{name!r} is none of cm/s^2, m/s^2, g, cm/s, cm")
     # A spectrum, for example, is in a unit of a quantity without being its time series
-    if kind.value.lower() != unit.quantity:
-        problem = f"{kind.value!r} is not a time series in {name}"
-        refuse(header.text, kind.line, "DATA_TYPE", problem)
+    if kind.lower() != unit.quantity:
+        header.refuse("DATA_TYPE", f"{kind!r} is not a time series in {name}")
     return unit
 
 
@@ -92,7 +90,7 @@ def _station(header: Header) -> Words:
     )
     return {
         **header.words(network="NETWORK", channel="STREAM", station_name="STATION_NAME"),
-        "station": header.required("STATION_CODE").value,
+        "station": header.required("STATION_CODE"),
         "location": location if len(location) == 2 else None,
         "coordinates": coordinates(**place),
         "instrument": {"model": word_in(sensor), **constants},
@@ -128,6 +126,6 @@ def _event(header: Header) -> Words:
         "name": header.word("EVENT_NAME"),
         "time": header.time(_TIME, "EVENT_DATE_YYYYMMDD", "EVENT_TIME_HHMMSS"),
         **header.numbers(latitude="EVENT_LATITUDE_DEGREE", longitude="EVENT_LONGITUDE_DEGREE"),
-        "depth": scaled(header.number("EVENT_DEPTH_KM"), 1000),
+        "depth": scale(header.number("EVENT_DEPTH_KM"), 1000),
         "magnitude": first_known(map(header.number, ("MAGNITUDE_W", "MAGNITUDE_L"))),
     }

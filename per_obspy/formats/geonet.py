@@ -13,7 +13,7 @@ from per_obspy.formats.text.header import (
     epicentre_place,
     number_in,
     place_pattern,
-    scaled,
+    scale,
     station_place,
     utc,
 )
@@ -26,7 +26,7 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
-    matched,
+    match_line,
     read_text,
     refuse,
 )
@@ -70,7 +70,7 @@ def read_geonet(file: WaveformFile, **_unused: Any) -> Stream:
 def _component(text: Text, first: int) -> tuple[Trace, int]:
     """Return a component and the line after it."""
     line_at(text, first + _HEADER_LINES, "samples")
-    title = matched(text, first, "title", _TITLE, "{} is not that of a component")
+    title = match_line(text, first, "title", _TITLE, "{} is not that of a component")
     # Integers and reals of the header
     numbers = first + _TEXT_LINES
     integers = [int(size) for size in fixed_block(text, numbers, _INTEGERS, _WIDTH, _PER_LINE)]
@@ -90,7 +90,7 @@ def _unit(text: Text, line: int, state: str) -> tuple[float, str]:
     """Return the unit of the samples, m/s2, and the level of processing."""
     if state == "Corrected":
         return _MILLIMETRE, "processed"
-    unit = matched(text, line, "unit", _UNIT, "{} names no multiple of mm/s/s")
+    unit = match_line(text, line, "unit", _UNIT, "{} names no multiple of mm/s/s")
     return float(unit[1]) * _MILLIMETRE, "raw"
 
 
@@ -126,7 +126,7 @@ def _motion(lines: list[str]) -> Words:
     # The corners lie where the transition bands end: inside the pass band
     return {
         "corners": corners(_BANDS.search(lines[11]), 2),
-        "header_peak": scaled(number_in(_PEAK.match(lines[13])), _MILLIMETRE),
+        "header_peak": scale(number_in(_PEAK.match(lines[13])), _MILLIMETRE),
         **orientation(lines[12].removeprefix("Component").split("  ")[0]),
     }
 
@@ -134,13 +134,13 @@ def _motion(lines: list[str]) -> Words:
 def _station(text: Text, first: int) -> Words:
     """Return codes, name, place and instrument of the station, and the event."""
     lines = text.lines[first : first + _TEXT_LINES]
-    site = matched(text, first + 1, "site", _SITE, "{} has no code and coordinates")
+    site = match_line(text, first + 1, "site", _SITE, "{} has no code and coordinates")
     # Depth in km
     event = {
         "name": lines[6].strip() or None,
         "time": _origin_time(_ORIGIN.match(lines[7])),
         **epicentre_place(_EPICENTRE.match(lines[8])),
-        "depth": scaled(number_in(_DEPTH.search(lines[8])), 1000),
+        "depth": scale(number_in(_DEPTH.search(lines[8])), 1000),
         "magnitude": number_in(_MAGNITUDE.search(lines[8])),
     }
     model, _, serial = lines[3].removeprefix("Instrument").strip().partition("_")

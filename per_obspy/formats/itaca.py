@@ -12,7 +12,7 @@ from per_obspy.formats.text.lines import (
     block_lines,
     fixed_block,
     head,
-    matched,
+    match_line,
     no_more,
     read_text,
 )
@@ -36,13 +36,13 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a corrected record of ITACA 2009: acceleration of one component, m/s2."""
     text = read_text(file)
     header = read_fields(text, _HEADER_LINES - 1)
-    matched(text, _HEADER_LINES - 1, "unit", _UNIT, "{} does not name m/s/s")
+    match_line(text, _HEADER_LINES - 1, "unit", _UNIT, "{} does not name m/s/s")
     samples = header.samples("Number of Data")
     values = fixed_block(text, _HEADER_LINES, samples, _WIDTH, _PER_LINE)
     no_more(text, _HEADER_LINES + block_lines(samples, _PER_LINE), samples)
     # The civil protection (DPC) runs the network with FDSN code IT
     header.required("Event Date & Time")
-    station = _STATION.match(header.required("Station Code / Name").value)
+    station = _STATION.match(header.required("Station Code / Name"))
     # Words without a value are dropped from the trace
     is_dpc = (header.word("Network") or "").startswith("DPC")
     words = {
@@ -53,6 +53,6 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
         "network": "IT" if is_dpc else None,
         "station": word_in(station),
         "station_name": word_in(station, 2),
-        **orientation(header.required("Orientation").value),
+        **orientation(header.required("Orientation")),
     }
     return Stream([trace(values, header.interval("Time Increment (s)"), words, text.name)])

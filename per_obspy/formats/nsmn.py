@@ -13,13 +13,12 @@ from per_obspy.formats.text.header import (
     number_in,
     place_pattern,
     read_fields,
-    scaled,
+    scale,
     station_place,
 )
 from per_obspy.formats.text.lines import (
     DECIMAL,
     NUMBER,
-    Text,
     WaveformFile,
     free_block,
     head,
@@ -47,26 +46,21 @@ def read_nsmn(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a record of NSMN: three components, m/s2."""
     text = read_text(file)
     header = read_fields(text, _HEADER_LINES - 1)
-    directions = _directions(text)
+    directions = line_at(text, _HEADER_LINES - 1, "components").split()
+    if len(directions) != 3 or not all(is_direction(orientation(name)) for name in directions):
+        problem = f"expected three directions, got {directions}"
+        refuse(text, _HEADER_LINES - 1, "components", problem)
     # One column per component
     samples = header.samples("NUMBER OF DATA")
     values = free_block(text, _HEADER_LINES, 3 * samples).reshape(-1, 3)
     dt = header.interval("SAMPLING INTERVAL (sec)")
+    # Peaks of the header, as far as it has them
     peaks = dict(_PEAKS.findall(header.word("RAW PGA VALUES (gal)") or ""))
     components = [
         orientation(name) | ({"header_peak": GAL * float(peaks[name])} if name in peaks else {})
         for name in directions
     ]
     return gal_columns(values, dt, _common_words(header), components)
-
-
-def _directions(text: Text) -> list[str]:
-    """Return the directions of the three columns."""
-    directions = line_at(text, _HEADER_LINES - 1, "components").split()
-    if len(directions) != 3 or not all(is_direction(orientation(name)) for name in directions):
-        problem = f"expected three directions, got {directions}"
-        refuse(text, _HEADER_LINES - 1, "components", problem)
-    return directions
 
 
 def _common_words(header: Header) -> Words:
@@ -76,14 +70,14 @@ def _common_words(header: Header) -> Words:
     event = {
         "time": header.time(_EVENT_TIME, "EARTHQUAKE DATE"),
         **place,
-        "depth": scaled(header.number("EARTHQUAKE DEPTH (km)"), 1000),
+        "depth": scale(header.number("EARTHQUAKE DEPTH (km)"), 1000),
         "magnitude": number_in(_MAGNITUDE.match(header.word("EARTHQUAKE MAGNITUDE") or "")),
     }
     elevation = header.number("STATION ALTITUDE (m)")
     site = _PLACE.search(header.word("STATION COORDINATES") or "")
     return {
         "network": "TK",
-        "station": header.required("STATION ID").value,
+        "station": header.required("STATION ID"),
         "station_name": header.word("PLACE"),
         "coordinates": station_place(site, event, elevation),
         "instrument": header.words(model="RECORDER TYPE", serial="RECORDER SERIAL NO"),

@@ -22,8 +22,8 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
-    matched,
-    quoted,
+    match_line,
+    quote,
     read_text,
     refuse,
 )
@@ -74,10 +74,10 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
     text = read_text(file)
     units = _QUANTITY.match(line_at(text, 2, "units").strip())
     if units is None or units.groups() not in _UNITS:
-        refuse(text, 2, "units", f"{quoted(text, 2)} is not a PEER quantity and unit")
+        refuse(text, 2, "units", f"{quote(text, 2)} is not a PEER quantity and unit")
     unit, factor = _UNITS[units[1], units[2]]
     # Number of samples, and their interval, s
-    size = matched(text, 3, "NPTS, DT", _SIZE, "{} names no number of samples and no interval")
+    size = match_line(text, 3, "NPTS, DT", _SIZE, "{} names no number of samples and no interval")
     samples, step = filter(None, size.groups())
     dt = interval(text, 3, "DT", step)
     values = factor * free_block(text, 4, count(text, 3, "NPTS", samples))

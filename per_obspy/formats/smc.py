@@ -7,7 +7,7 @@ from typing import Any
 from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats.text.header import first_known, scaled, word_in
+from per_obspy.formats.text.header import first_known, scale, word_in
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -17,7 +17,7 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
-    matched,
+    match_line,
     no_more,
     read_text,
     refuse,
@@ -51,7 +51,7 @@ def is_smc(file: WaveformFile) -> bool:
 def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     """Read SMC: one component, m/s2, m/s or m."""
     text = read_text(file)
-    title = matched(text, 0, "title", _TITLE, "{} is not that of a time series")[1]
+    title = match_line(text, 0, "title", _TITLE, "{} is not that of a time series")[1]
     line_at(text, _TEXT_LINES, "integers")
     # Integers and reals of the header, where they are known
     whole = fixed_block(text, _TEXT_LINES, _INTEGERS, _WIDTH, _PER_LINE)
@@ -120,12 +120,12 @@ def _motion(text: Text, integers: list[int | None], reals: list[float | None]) -
     return {
         "starttime": _start(text, integers),
         "corners": {"highpass": reals[32], "lowpass": reals[34]},
-        "header_peak": scaled(max(peaks, default=None), _CENTIMETRE),
+        "header_peak": scale(max(peaks, default=None), _CENTIMETRE),
         # Magnitude: moment, or else local, or else surface wave
         "event": {
             "latitude": reals[2],
             "longitude": reals[3],
-            "depth": scaled(reals[4], 1000),
+            "depth": scale(reals[4], 1000),
             "magnitude": first_known((reals[5], reals[7], reals[6])),
         },
         **_direction(integers),

@@ -18,7 +18,7 @@ from per_obspy.formats.text.header import (
     HeaderField,
     epicentre_place,
     first_known,
-    scaled,
+    scale,
     station_place,
 )
 from per_obspy.formats.text.lines import (
@@ -76,8 +76,8 @@ def read_unam(file: WaveformFile, **_unused: Any) -> Stream:
     header = _header(text, first)
     # Other units have never been seen
     unit = header.required(_UNITS)
-    if not unit.value.upper().startswith("GAL"):
-        refuse(text, unit.line, _UNITS, f"{unit.value!r} is not gal")
+    if not unit.upper().startswith("GAL"):
+        header.refuse(_UNITS, f"{unit!r} is not gal")
     # One column per channel, and in the header one value
     channels = header.samples("NUMERO DE CANALES")
     samples, dt = _size(header, channels)
@@ -86,8 +86,8 @@ def read_unam(file: WaveformFile, **_unused: Any) -> Stream:
     directions, peaks = (_values(header, name, channels) for name in (_DIRECTIONS, _PEAKS))
     components = []
     for direction, peak in zip(directions, peaks, strict=True):
-        largest = GAL * finite_number(text, peak.line, _PEAKS, peak.value)
-        components.append(_direction(direction.value) | {"header_peak": largest})
+        largest = GAL * finite_number(text, header.line(_PEAKS), _PEAKS, peak)
+        components.append(_direction(direction) | {"header_peak": largest})
     return gal_columns(values, dt, _common_words(header), components)
 
 
@@ -124,22 +124,23 @@ def _header(text: Text, stop: int) -> Header:
     return Header(text, fields)
 
 
-def _values(header: Header, name: str, channels: int) -> list[HeaderField]:
+def _values(header: Header, name: str, channels: int) -> list[str]:
     """Return the values of all channels, which slashes separate in two fields of six each."""
-    line, value = header.required(name)
     second = header.word(name.replace("C1-C6", "C7-C12")) or ""
-    parts = value.split("/")[1:] + second.split("/")[1:]
+    parts = header.required(name).split("/")[1:] + second.split("/")[1:]
     # Both fields begin with a slash
     if len(parts) < channels:
-        refuse(header.text, line, name, f"{len(parts)} values for {channels} channels")
-    return [HeaderField(line, part.strip()) for part in parts[:channels]]
+        header.refuse(name, f"{len(parts)} values for {channels} channels")
+    return [part.strip() for part in parts[:channels]]
 
 
 def _size(header: Header, channels: int) -> tuple[int, float]:
     """Return number of samples and interval, s, which all channels must share."""
-    text = header.text
-    sizes = [count(text, line, _SIZES, word) for line, word in _values(header, _SIZES, channels)]
-    steps = [interval(text, line, _STEPS, word) for line, word in _values(header, _STEPS, channels)]
+    text, line = header.text, header.line
+    sizes = [count(text, line(_SIZES), _SIZES, word) for word in _values(header, _SIZES, channels)]
+    steps = [
+        interval(text, line(_STEPS), _STEPS, word) for word in _values(header, _STEPS, channels)
+    ]
     # Columns of the block cannot differ
     if len(set(sizes)) > 1 or len(set(steps)) > 1:
         problem = f"channels must share length and interval, got {sizes}, {steps}"
@@ -174,8 +175,8 @@ def _refuse_missing_lines(header: Header, values: FloatArray) -> None:
     columns = zip(words, np.abs(values).T, strict=True)
     shifts = [_peak_shifts(column, int(word[:12])) for word, column in columns]
     if all(shifts) and not {0, 1}.intersection(*shifts):
-        line, places = header.fields[_PEAK_PLACES]
-        refuse(header.text, line, _PEAK_PLACES, f"{places}, but lines before are missing")
+        problem = f"{header.word(_PEAK_PLACES)}, but lines before are missing"
+        header.refuse(_PEAK_PLACES, problem)
 
 
 def _peak_shifts(column: FloatArray, promised: int) -> set[int]:
@@ -212,13 +213,13 @@ def _common_words(header: Header) -> Words:
     event = {
         "time": origin,
         **epicentre_place(_place(header, "COORDENADAS DEL EPICENTRO")),
-        "depth": scaled(depth, 1000),
+        "depth": scale(depth, 1000),
         "magnitude": _magnitude(header),
     }
     # The format has no network codes
     site = _place(header, "COORDENADAS DE LA ESTACION")
     return {
-        "station": header.required("CLAVE DE LA ESTACION").value,
+        "station": header.required("CLAVE DE LA ESTACION"),
         "station_name": header.word("NOMBRE DE LA ESTACION"),
         "coordinates": station_place(site, event, header.number("ALTITUD (msnm)")),
         "instrument": header.words(

@@ -12,7 +12,7 @@ from per_obspy.formats.text.header import (
     header_time,
     number_in,
     place_pattern,
-    scaled,
+    scale,
     station_place,
     word_in,
 )
@@ -22,7 +22,7 @@ from per_obspy.formats.text.lines import (
     WaveformFile,
     head_lines,
     line_at,
-    matched,
+    match_line,
     read_text,
 )
 from per_obspy.formats.text.vocabulary import Words, orientation, read_components, trace
@@ -69,7 +69,7 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     start = first + _VOLUME_1_LINES
     line_at(text, start, "samples")
     words = _words(text, first) | {"processing_level": "raw"}
-    matched(text, first + 11, "unit", _VOLUME_1_UNIT, "{} is not g/10")
+    match_line(text, first + 11, "unit", _VOLUME_1_UNIT, "{} is not g/10")
     samples = promised_points(text, first + 10)
     # Digitised film below FORTRAN's blank for the line printer, in g/10
     rows = [row[1:] if row.startswith(" ") else row for row in text.lines]
@@ -83,13 +83,13 @@ def _volume_2(text: Text, first: int) -> tuple[Trace, int]:
     line = first + _VOLUME_2_LINES
     line_at(text, line, "samples")
     words = _words(text, first + 1)
-    matched(text, line, "unit", _VOLUME_2_UNIT, "{} does not name cm/sec/sec")
+    match_line(text, line, "unit", _VOLUME_2_UNIT, "{} does not name cm/sec/sec")
     values, dt, line = corrected_blocks(text, line, ("ACC", "VEL", "DIS"))
     # Samples and peak are in gal
     words |= {
         "processing_level": "processed",
         "corners": corners(_BANDS.search(text.lines[first + 14]), 2),
-        "header_peak": scaled(number_in(_PEAK.match(text.lines[first + 17])), GAL),
+        "header_peak": scale(number_in(_PEAK.match(text.lines[first + 17])), GAL),
     }
     return trace(GAL * values, dt, words), line
 
@@ -97,7 +97,7 @@ def _volume_2(text: Text, first: int) -> tuple[Trace, int]:
 def _words(text: Text, first: int) -> Words:
     """Return the words of the lines that both volumes share."""
     lines = text.lines[first : first + 13]
-    matched(text, first, "title", _VOLUME_1, "{} is not that of a component")
+    match_line(text, first, "title", _VOLUME_1, "{} is not that of a component")
     # Names end where two blanks follow, that of the station also before a line number
     event = {
         "name": re.split(r"\s{2,}", lines[1].strip())[0] or None,

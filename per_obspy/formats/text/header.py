@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from re import Match, Pattern
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from obspy import UTCDateTime
 
@@ -73,20 +73,26 @@ class Header:
         """Return the text of several fields by other names."""
         return {word: self.word(name) for word, name in names.items()}
 
-    def required(self, name: str) -> HeaderField:
-        """Return a field that must be there and not be empty."""
+    def refuse(self, name: str, problem: str) -> NoReturn:
+        """Raise the error of a field."""
+        refuse(self.text, self.line(name), name, problem)
+
+    def line(self, name: str) -> int:
+        """Return the line of a field, the first of the file where it is missing."""
+        return self.fields[name].line if name in self.fields else 0
+
+    def required(self, name: str) -> str:
+        """Return the text of a field that must be there and not be empty."""
         if name not in self.fields:
-            refuse(self.text, 0, name, "the header has no such field")
-        if not self.fields[name].value:
-            refuse(self.text, self.fields[name].line, name, "empty")
-        return self.fields[name]
+            self.refuse(name, "the header has no such field")
+        return self.fields[name].value or self.refuse(name, "empty")
 
     def number(self, name: str) -> float | None:
         """Return a number, or None where the field is missing, empty or marked as unknown."""
         word = self.word(name) or ""
         if word.lower() in _UNKNOWN:
             return None
-        return finite_number(self.text, self.fields[name].line, name, word)
+        return finite_number(self.text, self.line(name), name, word)
 
     def numbers(self, **names: str) -> dict[str, float | None]:
         """Return the numbers of several fields by other names."""
@@ -94,22 +100,18 @@ class Header:
 
     def samples(self, name: str) -> int:
         """Return a positive whole number that must be there."""
-        line, value = self.required(name)
-        return count(self.text, line, name, value)
+        return count(self.text, self.line(name), name, self.required(name))
 
     def interval(self, name: str) -> float:
         """Return a positive number that must be there."""
-        line, value = self.required(name)
-        return interval(self.text, line, name, value)
+        return interval(self.text, self.line(name), name, self.required(name))
 
     def time(
         self, pattern: Pattern[str], *names: str, hours_ahead: float = 0.0
     ) -> UTCDateTime | None:
         """Return the time in the lines of one field or several; None where they hold none."""
         match = pattern.match("\n".join(self.word(name) or "" for name in names))
-        # A part of the pattern that matches nothing needs no field
-        line = self.fields[names[0]].line if names[0] in self.fields else 0
-        return header_time(self.text, line, names[0], match, hours_ahead)
+        return header_time(self.text, self.line(names[0]), names[0], match, hours_ahead)
 
 
 def read_fields(text: Text, stop: int) -> Header:
@@ -123,11 +125,11 @@ def read_fields(text: Text, stop: int) -> Header:
     return Header(text, fields)
 
 
-def scaled(number: float | None, factor: float) -> float | None:
+def scale(number: float | None, factor: float) -> float | None:
     """
     Return a number in another unit; None where it is unknown.
 
-    >>> scaled(7.5, 1000), scaled(None, 1000)
+    >>> scale(7.5, 1000), scale(None, 1000)
     (7500.0, None)
     """
     return None if number is None else factor * number
@@ -306,8 +308,8 @@ def station_place(
     for axis, size, letter in _angles(match):
         degrees = _signed(axis, size, letter)
         if degrees is None:
-            degrees = _near(size, epicentre.get(axis[0]))
-            problems.append(_problem(axis, f"{size:g} {letter}", degrees))
+            degrees, note = _mend_sign(axis, size, letter, epicentre.get(axis[0]))
+            problems.append(note)
         signed.append(degrees)
     # A place out of range is a separate problem
     place = coordinates(signed[0], signed[1], elevation)
@@ -340,21 +342,18 @@ def _signed(axis: _Axis, degrees: float, letter: str) -> float | None:
     return degrees if letter == positive and degrees >= 0 else None
 
 
-def _near(degrees: float, centre: float | None) -> float | None:
-    """Return the only one of both signs that is near the epicentre; None where none or both are."""
-    if centre is None:
-        return None
+def _mend_sign(
+    axis: _Axis, degrees: float, letter: str, centre: float | None
+) -> tuple[float | None, str]:
+    """Return the only one of both signs that is near the epicentre, None if any, and a note."""
+    name, positive, negative = axis
+    note = f"{name} {degrees:g} {letter}: {positive} or {negative} expected"
     # Differences of two angles, from 0 to 180 degrees
     near = [
-        sign for sign in (degrees, -degrees) if abs((sign - centre + 180) % 360 - 180) <= _REACH
+        sign
+        for sign in (degrees, -degrees)
+        if centre is not None and abs((sign - centre + 180) % 360 - 180) <= _REACH
     ]
-    return near[0] if len(near) == 1 else None
-
-
-def _problem(axis: _Axis, angle: str, degrees: float | None) -> str:
-    """Return the note of a wrong letter."""
-    name, positive, negative = axis
-    problem = f"{name} {angle}: {positive} or {negative} expected"
-    if degrees is None:
-        return f"{problem}, the epicentre does not decide, so the place is unknown"
-    return f"{problem}, {positive if degrees > 0 else negative} taken, the epicentre's side"
+    if len(near) != 1:
+        return None, f"{note}, the epicentre does not decide, so the place is unknown"
+    return near[0], f"{note}, {positive if near[0] > 0 else negative} taken, the epicentre's side"

@@ -110,18 +110,18 @@ def line_at(text: Text, line: int, field: str) -> str:
     return text.lines[line]
 
 
-def quoted(text: Text, line: int) -> str:
+def quote(text: Text, line: int) -> str:
     """Return the beginning of a line in quotes for a message, without blanks around it."""
     return repr(text.lines[line].strip()[:_QUOTED])
 
 
-def matched(
+def match_line(
     text: Text, line: int, field: str, pattern: re.Pattern[str], problem: str = "{} gives none"
 ) -> re.Match[str]:
     """Return what a pattern finds on a line; ``{}`` in the problem is the line in quotes."""
     match = pattern.search(line_at(text, line, field))
     if match is None:
-        refuse(text, line, field, problem.format(quoted(text, line)))
+        refuse(text, line, field, problem.format(quote(text, line)))
     return match
 
 

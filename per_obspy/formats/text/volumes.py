@@ -22,7 +22,7 @@ from per_obspy.formats.text.lines import (
     fixed_block,
     interval,
     line_at,
-    matched,
+    match_line,
     refuse,
 )
 from per_obspy.formats.text.vocabulary import Words
@@ -53,7 +53,7 @@ _INTERVAL = 0.02
 
 def promised_points(text: Text, line: int, pattern: Pattern[str] = _POINTS) -> int:
     """Return the number of samples in the text of a header."""
-    word = matched(text, line, "number of points", pattern)[1]
+    word = match_line(text, line, "number of points", pattern)[1]
     return count(text, line, "number of points", word)
 
 

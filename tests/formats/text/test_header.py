@@ -13,7 +13,7 @@ from per_obspy.formats.text.header import (
     full_year,
     header_time,
     read_fields,
-    scaled,
+    scale,
     station_place,
     utc,
 )
@@ -106,7 +106,7 @@ def test_impossible_dates_are_refused(date: tuple[int, ...]):
 def test_unknown_numbers_stay_unknown():
     assert first_known([None, None]) is None
     # zero is a number: a depth or magnitude of 0 is no gap
-    assert (scaled(0.0, 1000), first_known([None, 0.0, 1.0])) == (0.0, 0.0)
+    assert (scale(0.0, 1000), first_known([None, 0.0, 1.0])) == (0.0, 0.0)
 
 
 def place(words: str) -> re.Match[str]:

@@ -23,7 +23,7 @@ from per_obspy.formats.text.lines import (
     head,
     interval,
     line_at,
-    matched,
+    match_line,
     read_text,
 )
 
@@ -107,9 +107,9 @@ def test_any_line_end_and_any_byte_can_be_read():
 
 def test_a_line_that_fits_no_pattern_is_quoted():
     text = text_of("a = 5\n  b")
-    assert matched(text, 0, "a", re.compile(r"a = (\d)"))[1] == "5"
+    assert match_line(text, 0, "a", re.compile(r"a = (\d)"))[1] == "5"
     with pytest.raises(RecordRejected, match="line 2, a: 'b' gives none"):
-        matched(text, 1, "a", re.compile("a"))
+        match_line(text, 1, "a", re.compile("a"))
 
 
 LONG = "1" * (LONGEST_NUMBER + 1)
