@@ -236,12 +236,12 @@ def _places(
     steps = (half_sides + columns["gap"]) * _direction(np.deg2rad(azimuth))
     places = {"azimuth": azimuth}
     for i, offset in enumerate(_offsets(first, steps, rows, radius), start=1):
-        longitude, latitude = _moved(*stations[station].T, *offset)
+        longitude, latitude = _move(*stations[station].T, *offset)
         places |= {f"longitude_{i}": longitude, f"latitude_{i}": latitude}
     return places
 
 
-def _moved(
+def _move(
     longitude: FloatArray, latitude: FloatArray, east: FloatArray, north: FloatArray
 ) -> FloatArray:
     """Return places a few kilometres (m) to the east and north, degrees, Earth as flat."""

@@ -232,7 +232,7 @@ def _acceleration(
     for arrival, amplitude in ((scenario.pre_event, P_AMPLITUDE), (s_wave, 1.0)):
         delay = round(arrival / scenario.dt)
         shape = np.concatenate([np.zeros(delay), window[: n_padded - delay]])
-        noise = _correlated(generator, n_padded, scenario.correlation)
+        noise = _correlated_noise(generator, n_padded, scenario.correlation)
         wave = stochastic.shaped_noise(noise, shape, spectra, scenario.dt)
         motion += amplitude * wave[:, :n_samples]
     return motion
@@ -246,7 +246,9 @@ def _n_samples(scenario: Scenario, station: SimulatedStation, s_wave: float, sha
     return int(np.ceil(lasts / scenario.dt))
 
 
-def _correlated(generator: np.random.Generator, n_samples: int, correlation: float) -> FloatArray:
+def _correlated_noise(
+    generator: np.random.Generator, n_samples: int, correlation: float
+) -> FloatArray:
     """Return three rows of noise of which the first two are correlated."""
     north, east, up = generator.standard_normal((3, n_samples))
     return np.stack([north, correlation * north + np.sqrt(1.0 - correlation**2) * east, up])

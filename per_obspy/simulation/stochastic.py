@@ -82,11 +82,6 @@ def effective_distance(hypocentral: float, magnitude: float) -> float:
     return float(np.hypot(hypocentral, 1000.0 * 10.0 ** (-0.05 + 0.15 * magnitude)))
 
 
-def spreading(distance: float) -> float:
-    """Compute the geometrical spreading, 1/m."""
-    return 1.0 / distance if distance < CROSSOVER else 1.0 / np.sqrt(distance * CROSSOVER)
-
-
 def source_spectrum(
     frequency: FloatArray, magnitude: float, shear_velocity: float, density: float
 ) -> FloatArray:
@@ -118,9 +113,8 @@ def path_spectrum(
     Reference: Boore (2003), eq. 8.
     """
     factor = np.maximum(frequency, 1e-6) ** (1.0 - quality_exponent)
-    path: FloatArray = spreading(distance) * np.exp(
-        -np.pi * factor * distance / (quality * shear_velocity)
-    )
+    spreading = 1.0 / distance if distance < CROSSOVER else 1.0 / np.sqrt(distance * CROSSOVER)
+    path: FloatArray = spreading * np.exp(-np.pi * factor * distance / (quality * shear_velocity))
     return path
 
 

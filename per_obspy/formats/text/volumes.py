@@ -200,7 +200,7 @@ def even_film(text: Text, line: int, pairs: FloatArray, per_line: int) -> Film:
     per_line : int
         Pairs on a line, dimensionless.
     """
-    places = _growing(text, line, pairs[:, 0], per_line)
+    places = _rising_times(text, line, pairs[:, 0], per_line)
     times, values = pairs[places].T
     mean = _mean_interval(text, line, places, pairs[:, 0], per_line)
     # The largest distance from the even time axis of that interval
@@ -210,13 +210,13 @@ def even_film(text: Text, line: int, pairs: FloatArray, per_line: int) -> Film:
     if len(times) < len(pairs):
         notes.append(f"{len(pairs) - len(times)} times of the film run back and are left out")
     if deviation > mean / 2:
-        values, mean = _interpolated(times, values, mean)
+        values, mean = _interpolate(times, values, mean)
         notes.append(f"interpolated linearly onto steps of {mean:g} s")
     next_line = line + block_lines(len(pairs), per_line)
     return Film(values, mean, {"digitised": True, "notes": notes}, next_line)
 
 
-def _interpolated(times: FloatArray, values: FloatArray, mean: float) -> tuple[FloatArray, float]:
+def _interpolate(times: FloatArray, values: FloatArray, mean: float) -> tuple[FloatArray, float]:
     """Return values on even steps and their interval, s, which is not above the mean one."""
     # A mean interval that is longer by rounding only does not halve the steps
     halvings = int(np.ceil(np.log2(_INTERVAL / mean) - 1e-3))
@@ -225,7 +225,7 @@ def _interpolated(times: FloatArray, values: FloatArray, mean: float) -> tuple[F
     return np.interp(even, times, values), dt
 
 
-def _growing(text: Text, line: int, times: FloatArray, per_line: int) -> NDArray[np.intp]:
+def _rising_times(text: Text, line: int, times: FloatArray, per_line: int) -> NDArray[np.intp]:
     """Return the places of the times that exceed all before them; few may not."""
     latest = np.maximum.accumulate(times)
     runs_back = np.append(False, times[1:] <= latest[:-1])
