@@ -23,7 +23,6 @@ from per_obspy.formats.text.lines import (
     WaveformFile,
     block_lines,
     count,
-    finite_number,
     fixed_block,
     head,
     interval,
@@ -84,12 +83,12 @@ def _size(text: Text, first: int) -> tuple[int, float]:
     samples = count(text, first + _POINTS_LINE, "number of points", points[1])
     # The rate is on a separate line among the numbers
     line = first + _RATE_LINE
-    rate = finite_number(text, line, "sampling rate", text.lines[line][:_WIDTH])
+    rate = interval(text, line, "sampling rate", text.lines[line][:_WIDTH])
     duration = float(points[2])
-    if rate <= 0 or abs(samples / rate - duration) > 0.01 * duration:
+    if abs(samples / rate - duration) > 0.01 * duration:
         problem = f"{rate:g} Hz, but {samples} samples last {points[2]} s"
         refuse(text, line, "sampling rate", problem)
-    return samples, 1 / interval(text, line, "sampling rate", rate)
+    return samples, 1 / rate
 
 
 def _station(lines: list[str], epicentre: Words) -> Words:

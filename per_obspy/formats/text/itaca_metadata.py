@@ -30,6 +30,14 @@ _RANGES = {
     "event.pref_mag": (0.0, 10.0),
 }
 
+#: field -> word of the event; its depth is in km
+_EVENT = {
+    "event.latitude": "latitude",
+    "event.longitude": "longitude",
+    "event.focaldepth": "depth",
+    "event.pref_mag": "magnitude",
+}
+
 #: Words of the time in its field.
 _TIME = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d{1,6})?")
 
@@ -111,16 +119,9 @@ def _fields(name: str, text: str) -> dict[str, str]:
 
 def _event(name: str, time: str, numbers: dict[str, float]) -> Words:
     """Return time, hypocentre and magnitude of the event, as far as they are known."""
-    event: Words = {
-        word: factor * numbers[f"event.{field}"]
-        for word, field, factor in (
-            ("latitude", "latitude", 1.0),
-            ("longitude", "longitude", 1.0),
-            ("depth", "focaldepth", 1000.0),
-            ("magnitude", "pref_mag", 1.0),
-        )
-        if f"event.{field}" in numbers
-    }
+    event: Words = {word: numbers[field] for field, word in _EVENT.items() if field in numbers}
+    if "depth" in event:
+        event["depth"] *= 1000.0
     # A time that is written in another way is unknown
     if not _TIME.fullmatch(time):
         return event

@@ -86,9 +86,9 @@ def is_station_table(start: bytes) -> bool:
     >>> is_station_table(b"Station;Lat;Lon\n"), is_station_table(b"time,acceleration\n")
     (True, False)
     """
-    first_line = start.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf").split("\n")[0]
+    header = start.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf").split("\n")[0]
     try:
-        return set(_REQUIRED) <= set(_places(_fields(first_line)))
+        return set(_REQUIRED) <= set(_places(_fields(header, ";" if ";" in header else ",")))
     except csv.Error:
         return False
 
@@ -113,30 +113,25 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    # Lines are counted from 1; empty ones are passed over
+    # Lines are counted from 1; the header decides the separator
     header, *lines = text.splitlines() or [""]
-    places = _places(_line_fields(name, 1, header))
-    if missing := [column for column in _REQUIRED if column not in places]:
-        raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
-    # Every other line is a station or a comment
-    rows = []
-    for number, line in enumerate(lines, 2):
-        if line.strip() and not line.startswith("#"):
-            rows.append(_row(name, number, _line_fields(name, number, line, header), places))
+    separator = ";" if ";" in header else ","
+    number, rows = 1, []
+    try:
+        places = _places(_fields(header, separator))
+        if missing := [column for column in _REQUIRED if column not in places]:
+            raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
+        # Every other line is a station, a comment or empty
+        for number, line in enumerate(lines, 2):
+            if line.strip() and not line.startswith("#"):
+                rows.append(_row(name, number, _fields(line, separator), places))
+    except csv.Error as error:
+        raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
     return tuple(rows)
 
 
-def _line_fields(name: str, number: int, line: str, header: str | None = None) -> list[str]:
-    """Return the fields of a numbered line; refuse lines that cannot be divided."""
-    try:
-        return _fields(line, header)
-    except csv.Error as error:
-        raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
-
-
-def _fields(line: str, header: str | None = None) -> list[str]:
-    """Return the fields of a line, without blanks; the header decides the separator."""
-    separator = ";" if ";" in (line if header is None else header) else ","
+def _fields(line: str, separator: str) -> list[str]:
+    """Return the fields of a line, without blanks."""
     row = next(csv.reader([line], delimiter=separator), [])
     return [field.strip() for field in row]
 
