@@ -17,7 +17,7 @@ import shapely
 
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 from .pipeline.small_run import plain_reports
 

@@ -13,9 +13,6 @@ from per_obspy import pounding_histories, process, station_spectra
 from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Interpolation, Scenario, Screening, Simulation, load
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.records.simulation.earthquake import simulate
-from per_obspy.records.simulation.station_metadata import GAIN
 from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
 from per_obspy.screening.ground_motion.field import great_circle, residual_correlation
 from per_obspy.screening.ground_motion.site_motion import (
@@ -25,6 +22,8 @@ from per_obspy.screening.ground_motion.site_motion import (
 )
 from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.values import both, values
+from per_obspy.simulation.buildings import simulated_pairs
+from per_obspy.simulation.earthquake import GAIN, simulate
 
 #: Magnitudes of the earthquakes, one after the other.
 MAGNITUDES = (6.5, 7.0, 7.5)

@@ -10,8 +10,8 @@ import obspy
 from per_obspy import process
 from per_obspy.checks import FloatArray
 from per_obspy.config import Simulation, load
-from per_obspy.records.simulation.earthquake import simulate
 from per_obspy.records.text_table import read_columns
+from per_obspy.simulation.earthquake import simulate
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 

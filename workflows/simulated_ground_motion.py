@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from per_obspy import response_spectra
 from per_obspy.config import Scenario
-from per_obspy.records.simulation.earthquake import rock_acceleration
+from per_obspy.simulation.earthquake import rock_acceleration
 
 PERIODS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0])
 MAGNITUDES = (5.5, 6.0, 6.5, 7.0, 7.5)

@@ -11,7 +11,7 @@ import numpy as np
 
 import per_obspy
 from per_obspy.config.pairs import Scenario
-from per_obspy.records.simulation.earthquake import rock_acceleration
+from per_obspy.simulation.earthquake import rock_acceleration
 
 scenario = Scenario(magnitude=6.8)
 motion = rock_acceleration(scenario, hypocentral=20_000.0)[0]

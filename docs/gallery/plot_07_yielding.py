@@ -11,7 +11,7 @@ import numpy as np
 
 import per_obspy
 from per_obspy.config.pairs import Scenario
-from per_obspy.records.simulation.earthquake import rock_acceleration
+from per_obspy.simulation.earthquake import rock_acceleration
 
 scenario = Scenario(magnitude=7.2)
 motion, dt = rock_acceleration(scenario, hypocentral=15_000.0)[0], scenario.dt

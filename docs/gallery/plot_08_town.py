@@ -9,8 +9,8 @@ import matplotlib.pyplot as plt
 
 import per_obspy
 from per_obspy.config.pairs import Scenario
-from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.simulation.buildings import simulated_pairs
+from per_obspy.simulation.earthquake import simulate
 
 scenario = Scenario(magnitude=7.3, stations=6, city_radius=6_000.0)
 simulation = simulate(scenario)

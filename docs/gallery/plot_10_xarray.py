@@ -14,7 +14,7 @@ import xarray as xr
 
 import per_obspy
 from per_obspy.config.pairs import Scenario
-from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.simulation.earthquake import simulate
 
 simulation = simulate(Scenario(magnitude=6.8, stations=2))
 for trace in simulation.stream:

@@ -174,8 +174,8 @@ def simulate(
     Example: per-obspy simulate catalogs/demo/scenario.toml -o output/simulated
     """
     from per_obspy.config import Simulation, load
-    from per_obspy.records.simulation.earthquake import simulate as simulated
-    from per_obspy.records.simulation.earthquake import write_simulation
+    from per_obspy.simulation.earthquake import simulate as simulated
+    from per_obspy.simulation.earthquake import write_simulation
 
     simulation = simulated(load(scenario, Simulation).scenario)
     write_simulation(simulation, output)

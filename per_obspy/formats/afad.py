@@ -1,10 +1,10 @@
-"""AFAD (Türkiye, TADAS): DYNA's header below a few other lines, one component per file."""
+"""AFAD (Türkiye, TADAS): DYNA's header below a line of its own, one component per file."""
 
 from typing import Any
 
 from obspy import Stream
 
-from per_obspy.formats.text.dyna_header import read_dyna_text
+from per_obspy.formats.dyna import read_component
 from per_obspy.formats.text.lines import WaveformFile, head, read_text
 
 
@@ -15,4 +15,4 @@ def is_afad(file: WaveformFile) -> bool:
 
 def read_afad(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a record of AFAD: one component, m/s2."""
-    return read_dyna_text(read_text(file), 1)
+    return read_component(read_text(file), 1)

@@ -1,56 +1,137 @@
 """
 CSMIP (CGS, formerly CDMG) records and official spectra.
 
-RAW and volume 1 are uncorrected, volume 2 is corrected, volume 3 holds response spectra.
+RAW and volume 1 are uncorrected, volume 2 is corrected, volume 3 holds response spectra. RENADIC
+took over the header of volume 1.
 """
 
 import re
-from collections.abc import Callable
+from re import Match
 from typing import Any, NamedTuple
 
 import numpy as np
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
-from per_obspy.formats.text.csmip_header import Header, channel_name, known, read_header
-from per_obspy.formats.text.film import film_lines, read_film
+from per_obspy.formats.text.header import (
+    epicentre_place,
+    header_time,
+    number_in,
+    place_pattern,
+    scale,
+    station_place,
+    word_in,
+)
 from per_obspy.formats.text.lines import (
+    DECIMAL,
+    NUMBER,
     Text,
     WaveformFile,
     block_lines,
-    count,
     fixed_block,
     head,
     head_lines,
     line_at,
-    quoted,
+    match_line,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.number_blocks import is_title, titled_block
-from per_obspy.formats.text.vocabulary import trace
+from per_obspy.formats.text.vocabulary import (
+    Words,
+    channel_code,
+    orientation,
+    read_components,
+    trace,
+)
+from per_obspy.formats.text.volumes import (
+    corrected_blocks,
+    is_title,
+    promised_points,
+    read_film,
+    sensor_constants,
+    titled_block,
+)
 
+_VOLUME_1 = re.compile(
+    rb"UNCORRECTED ACCELEROGRAM DATA.*?UNITS OF UNCOR", re.DOTALL | re.IGNORECASE
+)
+_VOLUME_3 = re.compile("^RESPONSE AND FOURIER AMPLITUDE SPECTRA", re.IGNORECASE)
+_DAMPING = re.compile("^DAMPING", re.IGNORECASE)
 _INCH = 0.0254  # m
-_UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s++(G/10|G)\b")
-_PROMISED = re.compile(r"NO\. OF POINTS\s*+=\s*+(\S+)")
+_UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s++(G/10|G)\b", re.IGNORECASE)
 _UNITS_OF_UNCORRECTED = {"G": STANDARD_GRAVITY, "G/10": STANDARD_GRAVITY / 10}
+_CORRECTED_UNIT = re.compile("CM/SEC2|CM/SEC/SEC", re.IGNORECASE)
+_END = re.compile("^/&")
+
+#: lines of text and real numbers of the headers of volumes 1, 2 and 3
+_HEADER_LINES = 13  # that all have
 _VOLUME_1_LINES, _VOLUME_1_REALS = 13, 50
 _VOLUME_2_LINES, _VOLUME_2_REALS = 24, 100
 _VOLUME_3_LINES = 28
+_INTEGER_LINES = 7  # 100 integers, 16 a line; all their values are in the text too
+
 _SLOTS = 100  # of every array of a volume 3, filled or not
 _SLOT_WIDTH, _SLOTS_PER_LINE = 10, 8
+_SLOT_LINES = block_lines(_SLOTS, _SLOTS_PER_LINE)
 _ARRAYS = 7  # of every damping of a volume 3: SD, SV, SA, PSV and three others
+
+_RECORD_OF = ("RECORD OF", "RCRD OF")
+_UNKNOWN = (-999.0, 0.0)
+
+# Line 4 (from 0): station number, coordinates, recorder, channels
+_PLACE = place_pattern(NUMBER, r"[,\s]\s*+")
+_SITE = re.compile(rf"STATION (?:NO|ID)\.\s*+(\S*?)\s++{_PLACE}")
+_MODEL = re.compile(r"[NSEW][,\s]\s*+[\d.]++\s*+[NSEW]\s++(\S.{0,80}?)\s*+S/N\s*+(\w*+)")
+_CHANNELS = re.compile(r"\(\s*+(\d{1,3})\s*+CHNS OF\s*+(\d{1,3})")
+
+# Lines 5, 6, 9: agency; channel and direction; instrument
+_AGENCIES = re.compile(r"\b(CGS|CDMG|CSMIP)\b")
+_CHANNEL = re.compile(
+    r"CHAN\s*+(\d{1,3}):\s*+(.*?)\s*+(?:\(STA CHN:\s*+(\d{1,3})\)\s*+)?(?:LOCATION:\s*+(.*+))?"
+)
+_SENSITIVITY = re.compile(rf"SENSITIVITY\s*+=\s*+{DECIMAL}\s*+V(?:DC)?/G")
+
+# Line 3: SEED names and start; lines 1 and 2: time of the record and of the origin
+_SEED = re.compile(r"[^.]*\.([A-Z0-9]{1,2})\.([A-Z0-9]{1,5})\.\S\S\.H")
+_CLOCK = (
+    r"(?P<month>\d{1,2})/\s*+(?P<day>\d{1,2})/\s*+(?P<year>\d{1,4}),?\s++"
+    rf"(?P<hour>\d{{1,2}}):\s*+(?P<minute>\d{{1,2}}):\s*+(?P<second>{NUMBER})\s*+(?P<zone>[A-Z]++)"
+)
+_START = re.compile(rf"(?:START|TRIGGER) TIME:\s*+{_CLOCK}")
+_ORIGIN = re.compile(rf"ORIGIN[^:]*+:\s*+{_CLOCK}")
+_RECORDED = re.compile(
+    r"^(?:RECORD|RCRD) OF.*?\b(?P<month>[A-Z]{3})[A-Z]*+\s++(?P<day>\d{1,2}),\s++(?P<year>\d{4})"
+    rf"\s++(?P<hour>\d{{1,2}}):(?P<minute>\d{{1,2}})(?::(?P<second>{NUMBER}))?\s++(?P<zone>[A-Z]++)"
+)
+_NO_CLOCK = re.compile(r"\b0?1/\s*+0?1/\s*+(?:19)?80\b")  # date of instruments without a clock
+
+# Line 8: hypocentre
+_EPICENTRE = re.compile(_PLACE)
+_DEPTH = re.compile(rf"\bH=\s*+{DECIMAL}\s*+KM")
+_MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*+{DECIMAL}")
+
+
+class _Header(NamedTuple):
+    """Header of one channel: words, number in the file, real numbers, line after it."""
+
+    words: Words
+    channel: int
+    reals: list[float | None]
+    next_line: int
 
 
 def is_volume_1(file: WaveformFile) -> bool:
     """Check whether a file starts like CSMIP RAW or volume 1."""
-    start = head(file, 1200).upper()
-    return (
-        start.startswith(b"UNCORRECTED ACCELEROGRAM DATA")
-        and b"UNITS OF UNCOR" in start
-        and b"RENADIC" not in start
-    )
+    return volume_1_agency(file) == "CSMIP"
+
+
+def volume_1_agency(file: WaveformFile) -> str | None:
+    """Return the agency of a file that starts like a volume 1, CSMIP or RENADIC, or None."""
+    start = head(file, 1200)
+    if not _VOLUME_1.match(start):
+        return None
+    return "RENADIC" if b"RENADIC" in start.upper() else "CSMIP"
 
 
 def is_volume_2(file: WaveformFile) -> bool:
@@ -65,100 +146,172 @@ def is_volume_2(file: WaveformFile) -> bool:
 
 def read_volume_1(file: WaveformFile, **_unused: Any) -> Stream:
     """Read CSMIP RAW or volume 1: uncorrected acceleration of all channels, m/s2."""
-    return _channels(read_text(file), _volume_1_channel)
+    return read_components(read_text(file), _volume_1_channel)
 
 
 def read_volume_2(file: WaveformFile, **_unused: Any) -> Stream:
     """Read CSMIP volume 2: corrected acceleration of all channels, m/s2."""
-    return _channels(read_text(file), _volume_2_channel)
-
-
-def _channels(text: Text, read_channel: Callable[[Text, int], tuple[Trace, int]]) -> Stream:
-    """Return all channels of a file."""
-    stream, line = Stream(), 0
-    while line < len(text.lines):
-        component, line = read_channel(text, line)
-        stream.append(component)
-        line = _end_of_channel(text, line)
-    return stream
-
-
-def _end_of_channel(text: Text, line: int) -> int:
-    """Return the line after the mark that ends a channel."""
-    if not line_at(text, line, "end of channel").startswith("/&"):
-        problem = f"expected '/&' after the samples, got {quoted(text, line, 40)}"
-        refuse(text, line, "end of channel", problem)
-    return line + 1
+    return read_components(read_text(file), _volume_2_channel)
 
 
 def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
-    """Return a channel of uncorrected acceleration and the line after its samples."""
-    header = read_header(text, first, _VOLUME_1_LINES, _VOLUME_1_REALS)
-    factor = _uncorrected_unit(text, first + 11)
-    samples = _promised_samples(text, first + 10)
+    """Return a channel of uncorrected acceleration and the line after its end."""
+    header = _read_header(text, first, _VOLUME_1_LINES, _VOLUME_1_REALS)
+    unit = match_line(text, first + 11, "unit", _UNITS, "{} is neither g nor g/10")[1].upper()
+    samples = promised_points(text, first + 10)
+    # The header's peak is in g, whatever the unit of the samples
+    words = {"processing_level": "raw", "header_peak": scale(header.reals[6], STANDARD_GRAVITY)}
+    line = header.next_line
     # Even samples have a title; film has none
-    film: dict[str, Any] = {}
-    if is_title(line_at(text, header.next_line, "samples")):
-        values, dt, line = titled_block(text, header.next_line, "", 8, 9)
+    if is_title(line_at(text, line, "samples")):
+        values, dt, end = titled_block(text, line, "", 8, 9)
         if len(values) != samples:
             problem = f"{len(values)}, but {samples} on line {first + 11}"
-            refuse(text, header.next_line, "number of points", problem)
+            refuse(text, line, "number of points", problem)
     else:
-        values, dt, film = read_film(text, header.next_line, samples)
-        line = header.next_line + film_lines(samples)
-    # The header's peak is in g, whatever the unit of the samples
-    words = {"processing_level": "raw", "header_peak": _peak(header.reals[6], STANDARD_GRAVITY)}
-    return _trace(factor * values, dt, header, words | film), line
-
-
-def _promised_samples(text: Text, line: int) -> int:
-    """Return the number of samples that the text of a volume 1 promises."""
-    promised = _PROMISED.match(text.lines[line].strip().upper())
-    if promised is None:
-        refuse(text, line, "number of points", f"{quoted(text, line)} gives none")
-    return count(text, line, "number of points", promised[1])
+        values, dt, film, end = read_film(text, line, samples)
+        words |= film
+    return _trace(_UNITS_OF_UNCORRECTED[unit] * values, dt, header, words), _end(text, end)
 
 
 def _volume_2_channel(text: Text, first: int) -> tuple[Trace, int]:
-    """Return a channel of corrected acceleration and the line after its last block."""
-    header = read_header(text, first + 1, _VOLUME_2_LINES, _VOLUME_2_REALS)
-    title = line_at(text, header.next_line, "title of acceleration").upper()
-    if "CM/SEC2" not in title and "CM/SEC/SEC" not in title:
-        refuse(text, header.next_line, "unit", f"{title.strip()!r} does not name cm/sec2")
-    # Velocity and displacement follow the acceleration and must be whole
-    values, dt, line = titled_block(text, header.next_line, "ACCEL", 8, 10)
-    for kind in ("VELOC", "DISPL"):
-        integral, _, line = titled_block(text, line, kind, 8, 10)
-        if len(integral) != len(values):
-            problem = f"{len(integral)} samples, acceleration has {len(values)}"
-            refuse(text, line - 1, kind, problem)
+    """Return a channel of corrected acceleration and the line after its end."""
+    header = _read_header(text, first + 1, _VOLUME_2_LINES, _VOLUME_2_REALS)
+    match_line(text, header.next_line, "unit", _CORRECTED_UNIT, "{} does not name cm/sec2")
+    values, dt, line = corrected_blocks(text, header.next_line, ("ACCEL", "VELOC", "DISPL"))
     # Corners in Hz, peak in gal
     words = {
         "processing_level": "processed",
-        "corners": {"highpass": known(header.reals[61]), "lowpass": known(header.reals[72])},
-        "header_peak": _peak(header.reals[65], GAL),
+        "corners": {"highpass": header.reals[61], "lowpass": header.reals[72]},
+        "header_peak": scale(header.reals[65], GAL),
     }
-    return _trace(GAL * values, dt, header, words), line
+    return _trace(GAL * values, dt, header, words), _end(text, line)
 
 
-def _trace(values: FloatArray, dt: float, header: Header, words: dict[str, Any]) -> Trace:
-    """Return acceleration in m/s2 with the words of its header."""
-    words |= {"units": "m/s2", "quantity": "acceleration", "channel": channel_name(header, dt)}
-    return trace(values, dt, header.words | words)
+def _end(text: Text, line: int) -> int:
+    """Return the line after the mark that ends a channel."""
+    match_line(text, line, "end of channel", _END, "expected '/&' after the samples, got {}")
+    return line + 1
 
 
-def _peak(value: float, factor: float) -> float | None:
-    """Return the absolute peak of the header in SI, or None where it is unknown."""
-    peak = known(value, factor)
-    return None if peak is None else abs(peak)
+def _trace(values: FloatArray, dt: float, header: _Header, words: Words) -> Trace:
+    """Return acceleration in m/s2; channels without an azimuth are numbered as in the file."""
+    code = channel_code(1 / dt, header.words)
+    if len(code) < 3 or "direction" in header.words:
+        code = f"{code[:2]}{header.channel % 10}"
+    return trace(values, dt, header.words | words | {"channel": code})
 
 
-def _uncorrected_unit(text: Text, line: int) -> float:
-    """Return the unit of uncorrected samples, m/s2."""
-    unit = _UNITS.search(text.lines[line].upper())
-    if unit is None:
-        refuse(text, line, "unit", f"{quoted(text, line)} is neither g nor g/10")
-    return _UNITS_OF_UNCORRECTED[unit[1]]
+def _read_header(text: Text, first: int, text_lines: int, reals: int) -> _Header:
+    """
+    Read the header of one channel.
+
+    Parameters
+    ----------
+    text : Text
+        The file.
+    first : int
+        Line of the first of the thirteen common lines.
+    text_lines, reals : int
+        Lines of text from there to the integers, real numbers after those.
+    """
+    line_at(text, first + _HEADER_LINES - 1, "header")
+    lines = [line.upper() for line in text.lines[first : first + _HEADER_LINES]]
+    channel = _CHANNEL.fullmatch(lines[6].strip())
+    if channel is None:
+        refuse(text, first + 6, "channel", f"{lines[6].strip()!r} names no channel")
+    numbers = first + text_lines + _INTEGER_LINES
+    line_at(text, numbers, "header numbers")
+    # Words of the thirteen lines of text, then the real numbers
+    words = _words(text, first, lines, channel)
+    values = fixed_block(text, numbers, reals, 10, 8)
+    known = [None if value in _UNKNOWN else float(value) for value in values]
+    return _Header(words, int(channel[1]), known, numbers + block_lines(reals, 8))
+
+
+def _words(text: Text, first: int, lines: list[str], channel: Match[str]) -> Words:
+    """Return the words of the thirteen lines of text, in capitals."""
+    event = _event(text, first, lines)
+    model = _MODEL.search(lines[4])
+    sensitivity = number_in(_SENSITIVITY.search(lines[9]))
+    # The location code separates instruments
+    return {
+        **_station(lines, event),
+        "event": event,
+        "instrument": {
+            "model": word_in(model),
+            "serial": word_in(model, 2),
+            **sensor_constants(lines[9]),
+            "sensitivity": None if sensitivity is None else sensitivity / STANDARD_GRAVITY,
+        },
+        **orientation(channel[2]),
+        "sensor_location": channel[4] or None,
+        "starttime": _start(text, first, lines),
+        "location": _location(lines[4], int(channel[1]), int(channel[3] or channel[1])),
+    }
+
+
+def _location(site: str, channel: int, station_channel: int) -> str | None:
+    """
+    Return a location code that separates the instruments of one station.
+
+    The components of an instrument share it: a recorder of three channels is named by its first
+    one; a recorder that serves sensors all over a structure gives each a number.
+    """
+    channels = _CHANNELS.search(site)
+    recorder, station = (int(channels[1]), int(channels[2])) if channels else (0, 0)
+    if station <= 4 and recorder == station:
+        return None
+    return f"{station_channel - channel + 1 if recorder <= 3 else station_channel:02d}"
+
+
+def _station(lines: list[str], epicentre: Words) -> Words:
+    """Return codes, name and coordinates of the station."""
+    site = _SITE.match(lines[4].strip())
+    name, *owner = re.split(r"\s{2,}|\s+S/N", lines[5].strip())
+    # SEED names where the header has them, else the agency's number or the name of the place
+    if seed := _SEED.match(lines[3]):
+        network, code = seed.groups()
+    else:
+        network = "CE" if _AGENCIES.search(owner[0] if owner else lines[0]) else ""
+        code = word_in(site) or re.sub(r"[^A-Z0-9]", "", name)
+    return {
+        "network": network,
+        "station": code,
+        "station_name": name or None,
+        "coordinates": station_place(site, epicentre),
+    }
+
+
+def _start(text: Text, first: int, lines: list[str]) -> UTCDateTime | None:
+    """Return the start of the record, or else the time in the title ``RECORD OF``."""
+    if start := _START.search(lines[3]):
+        return _clock(text, first + 3, start)
+    return header_time(text, first + 1, "time", _RECORDED.match(lines[1]))
+
+
+def _clock(text: Text, line: int, match: Match[str] | None) -> UTCDateTime | None:
+    """Return the time of a clock; None where there is none or it was not set."""
+    if match is None or _NO_CLOCK.search(match[0]):
+        return None
+    return header_time(text, line, "time", match)
+
+
+def _event(text: Text, first: int, lines: list[str]) -> Words:
+    """Return name, origin time, hypocentre and magnitude of the event."""
+    epicentre = epicentre_place(_EPICENTRE.search(lines[8]))
+    depth = scale(number_in(_DEPTH.search(lines[8])), 1000)
+    # Moment magnitude, or else the first that is above zero
+    sizes = [(kind, float(size)) for kind, size in _MAGNITUDE.findall(lines[8])]
+    magnitudes = {kind: size for kind, size in sizes if size > 0}
+    # A depth without an epicentre is a mark for unknown
+    return {
+        "name": None if lines[1].startswith(_RECORD_OF) else lines[1].strip(),
+        "time": _clock(text, first + 2, _ORIGIN.search(lines[2])),
+        **epicentre,
+        "depth": depth if epicentre else None,
+        "magnitude": magnitudes.get("MW", next(iter(magnitudes.values()), None)),
+    }
 
 
 class OfficialSpectra(NamedTuple):
@@ -197,61 +350,42 @@ def read_spectra(file: WaveformFile) -> tuple[OfficialSpectra, ...]:
         If the file is not a volume 3 or lacks parts that its header announces.
     """
     text = read_text(file)
-    if not text.lines[0].upper().startswith("RESPONSE AND FOURIER AMPLITUDE SPECTRA"):
-        refuse(text, 0, "title", f"{quoted(text, 0, 60)} is not that of a volume 3")
+    match_line(text, 0, "title", _VOLUME_3, "{} is not that of a volume 3")
     # A channel ends as those of the other volumes do
     spectra, line = [], 0
     while line < len(text.lines):
         channel, line = _spectra_channel(text, line)
         spectra.append(channel)
-        line = _end_of_channel(text, line)
+        line = _end(text, line)
     return tuple(spectra)
 
 
 def _spectra_channel(text: Text, first: int) -> tuple[OfficialSpectra, int]:
     """Return the spectra of a channel and the line after them."""
-    header = read_header(text, first + 2, _VOLUME_3_LINES, _VOLUME_2_REALS)
+    header = _read_header(text, first + 2, _VOLUME_3_LINES, _VOLUME_2_REALS)
     periods, dampings = _spectra_size(text, first + 2 + _VOLUME_3_LINES)
     # Dampings, periods, and the Fourier spectrum with its title, which is passed over
-    damping = fixed_block(text, header.next_line, dampings, _SLOT_WIDTH, _SLOTS_PER_LINE)
     line = header.next_line + 1
+    damping = fixed_block(text, header.next_line, dampings, _SLOT_WIDTH, _SLOTS_PER_LINE)
     grid = _slots(text, line, periods)
-    line += 2 * block_lines(_SLOTS, _SLOTS_PER_LINE) + 1
-    # Arrays of every damping, (n_arrays, n_damping, n_periods)
+    line += 2 * _SLOT_LINES + 1
+    # Arrays of every damping below their title, (n_arrays, n_damping, n_periods)
     values = np.empty((_ARRAYS, dampings, periods))
-    for index in range(dampings):
-        values[:, index], line = _spectra_of_damping(text, line, damping[index], periods)
+    for index, fraction in enumerate(damping):
+        problem = f"expected the spectra of {fraction:g}, got {{}}"
+        match_line(text, line, "damping", _DAMPING, problem)
+        for kind in range(_ARRAYS):
+            values[kind, index] = _slots(text, line + 1 + kind * _SLOT_LINES, periods)
+        line += _ARRAYS * _SLOT_LINES + 1
     return _in_si(header.channel, grid, damping, values), line
 
 
 def _spectra_size(text: Text, line: int) -> tuple[int, int]:
     """Return the numbers of periods and dampings, which are among the header's integers."""
-    integers = fixed_block(text, line, 100, 5, 16)
-    periods, dampings = int(integers[67]), int(integers[68])
+    periods, dampings = map(int, fixed_block(text, line, 100, 5, 16)[67:69])
     if not 0 < periods <= _SLOTS or not 0 < dampings <= 8:
         refuse(text, line + 4, "periods, dampings", f"{periods} and {dampings}")
     return periods, dampings
-
-
-def _slots(text: Text, line: int, periods: int) -> FloatArray:
-    """Return the filled slots of an array."""
-    return fixed_block(text, line, _SLOTS, _SLOT_WIDTH, _SLOTS_PER_LINE)[:periods]
-
-
-def _spectra_of_damping(
-    text: Text, line: int, damping: float, periods: int
-) -> tuple[FloatArray, int]:
-    """Return the arrays of one damping, (n_arrays, n_periods), and the line after them."""
-    title = line_at(text, line, "damping").upper()
-    if not title.startswith("DAMPING"):
-        problem = f"expected the spectra of {damping:g}, got {title.strip()[:40]!r}"
-        refuse(text, line, "damping", problem)
-    # All arrays have as many lines
-    values = np.empty((_ARRAYS, periods))
-    for kind in range(_ARRAYS):
-        values[kind] = _slots(text, line + 1, periods)
-        line += block_lines(_SLOTS, _SLOTS_PER_LINE)
-    return values, line + 1
 
 
 def _in_si(
@@ -262,3 +396,8 @@ def _in_si(
     return OfficialSpectra(
         channel, periods, damping, sd * _INCH, sv * _INCH, sa * STANDARD_GRAVITY, psv * _INCH
     )
+
+
+def _slots(text: Text, line: int, periods: int) -> FloatArray:
+    """Return the filled slots of an array."""
+    return fixed_block(text, line, _SLOTS, _SLOT_WIDTH, _SLOTS_PER_LINE)[:periods]

@@ -4,19 +4,11 @@ import re
 from typing import Any
 
 import numpy as np
-from obspy import Stream, UTCDateTime
+from obspy import Stream
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL
-from per_obspy.formats.text.conversions import metres, utc_from_words
-from per_obspy.formats.text.fields import (
-    Fields,
-    interval_field,
-    number_field,
-    read_fields,
-    required_field,
-    text_field,
-)
+from per_obspy.formats.text.header import CLOCK, Header, read_fields, scale
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -27,11 +19,18 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, is_direction, orientation, trace
+from per_obspy.formats.text.vocabulary import (
+    Words,
+    coordinates,
+    gal_columns,
+    is_direction,
+    orientation,
+)
 
+_LENGTH = "RecordLength(sec)"
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s++(\w)\(\+\);?\s*+(\w)\(\+\);?\s*+(\w)\(\+\)")
-_TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})-(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
+_TIME = re.compile(rf"(?P<year>\d{{4}})/(?P<month>\d{{1,2}})/(?P<day>\d{{1,2}})-{CLOCK}")
 _EXTREMES = re.compile(rf"{DECIMAL}~\s*+{DECIMAL}")
 _HOURS_AHEAD = 8.0
 _TIME_ROUNDING = 0.001  # s, times have three decimals
@@ -46,53 +45,33 @@ def is_cwb(file: WaveformFile) -> bool:
 def read_cwb(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a record of CWB: three components, m/s2."""
     text = read_text(file)
-    first = _first_sample(text)
-    fields = read_fields(text, first)
-    directions = _directions(text, fields)
-    dt = 1 / interval_field(text, fields, "SampleRate(Hz)")
-    samples = _samples(text, fields, dt)
-    # Columns of time and three components
-    table = free_block(text, first, None, 4 * samples).reshape(-1, 4)
-    _check_times(text, first, table[:, 0], dt)
-    common = _common_words(text, fields)
-    # One trace per component
-    stream = Stream()
-    for direction, column in zip(directions, table.T[1:], strict=True):
-        words = common | orientation(direction) | {"header_peak": _peak(fields, direction)}
-        stream.append(trace(np.ascontiguousarray(GAL * column), dt, words))
-    return stream
-
-
-def _first_sample(text: Text) -> int:
-    """Return the first line that is neither blank nor a part of the header."""
-    lines = enumerate(text.lines)
-    samples = (line for line, content in lines if content.strip() and content[0] != "#")
-    first = next(samples, None)
+    rows = enumerate(text.lines)
+    first = next((line for line, row in rows if row.strip() and row[0] != "#"), None)
     if first is None:
         refuse(text, len(text.lines) - 1, "samples", "the file ends after its header")
-    return first
+    header = read_fields(text, first)
+    directions = _directions(header)
+    # The length of the record gives the number of samples
+    dt = 1 / header.interval("SampleRate(Hz)")
+    seconds = header.interval(_LENGTH)
+    samples = count(text, header.line(_LENGTH), _LENGTH, str(round(seconds / dt)))
+    # Columns of time and three components
+    table = free_block(text, first, 4 * samples).reshape(-1, 4)
+    _check_times(text, first, table[:, 0], dt)
+    components = [orientation(name) | _peak(header, name) for name in directions]
+    return gal_columns(table[:, 1:], dt, _common_words(header), components)
 
 
-def _directions(text: Text, fields: Fields) -> tuple[str, ...]:
+def _directions(header: Header) -> tuple[str, ...]:
     """Return the directions of the columns after time, which must be in gal."""
-    unit = required_field(text, fields, "AmplitudeUnit")
-    columns = required_field(text, fields, "DataSequence")
-    if not unit.value.startswith("gal"):
-        refuse(text, unit.line, "AmplitudeUnit", f"{unit.value!r} is not gal")
+    unit, columns = header.required("AmplitudeUnit"), header.required("DataSequence")
+    if not unit.startswith("gal"):
+        header.refuse("AmplitudeUnit", f"{unit!r} is not gal")
     # All three must be directions
-    names = _COLUMNS.match(columns.value)
+    names = _COLUMNS.match(columns)
     if names is None or not all(is_direction(orientation(name)) for name in names.groups()):
-        problem = f"{columns.value!r} is not time and three directions"
-        refuse(text, columns.line, "DataSequence", problem)
+        header.refuse("DataSequence", f"{columns!r} is not time and three directions")
     return names.groups()
-
-
-def _samples(text: Text, fields: Fields, dt: float) -> int:
-    """Return the number of samples that fit the length of the record."""
-    name = "RecordLength(sec)"
-    length = required_field(text, fields, name)
-    seconds = interval_field(text, fields, name)
-    return count(text, length.line, name, str(round(seconds / dt)))
 
 
 def _check_times(text: Text, first: int, times: FloatArray, dt: float) -> None:
@@ -103,49 +82,35 @@ def _check_times(text: Text, first: int, times: FloatArray, dt: float) -> None:
         refuse(text, first + index, "time", f"{times[index]:g} s breaks the spacing of {dt:g} s")
 
 
-def _peak(fields: Fields, direction: str) -> float | None:
-    """Return the larger of the two extremes of a component, m/s2."""
-    extremes = _EXTREMES.match(text_field(fields, f"AmplitudeMAX. {direction}") or "")
+def _peak(header: Header, direction: str) -> dict[str, float]:
+    """Return the larger of the two extremes of a component, m/s2, as far as it is known."""
+    extremes = _EXTREMES.match(header.word(f"AmplitudeMAX. {direction}") or "")
     if extremes is None:
-        return None
-    return GAL * max(abs(float(extremes[1])), abs(float(extremes[2])))
+        return {}
+    return {"header_peak": GAL * max(abs(float(extreme)) for extreme in extremes.groups())}
 
 
-def _common_words(text: Text, fields: Fields) -> dict[str, Any]:
-    """Return the words that all components share."""
-    words = _station(text, fields) | {"event": _event(text, fields)}
-    words["starttime"] = _time(text, fields, "StartTime(GMT+08)")
-    return words | {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
-
-
-def _station(text: Text, fields: Fields) -> dict[str, Any]:
-    """Return codes, name, coordinates and instrument of the station."""
-    latitude = number_field(text, fields, "StationLatitude(N)")
-    longitude = number_field(text, fields, "StationLongitude(E)")
+def _common_words(header: Header) -> Words:
+    """Return the words that all components share; clocks are eight hours ahead."""
+    origin, start = (
+        header.time(_TIME, f"{name}(GMT+08)", hours_ahead=_HOURS_AHEAD)
+        for name in ("Origin Time", "StartTime")
+    )
+    hypocentre = header.numbers(
+        latitude="EpicenterLatitude(N)",
+        longitude="EpicenterLongitude(E)",
+        depth="Depth(km)",
+        magnitude="Magnitude(Ml)",
+    )
+    place = header.numbers(latitude="StationLatitude(N)", longitude="StationLongitude(E)")
+    # Depth becomes metres
     return {
         "network": "TW",
-        "station": required_field(text, fields, "StationCode").value,
-        "station_name": text_field(fields, "StationName"),
-        "coordinates": coordinates(latitude, longitude),
-        "instrument": {"model": text_field(fields, "InstrumentKind")},
+        "station": header.required("StationCode"),
+        "station_name": header.word("StationName"),
+        "coordinates": coordinates(**place),
+        "instrument": header.words(model="InstrumentKind"),
+        "starttime": start,
+        "processing_level": "raw",
+        "event": {**hypocentre, "time": origin, "depth": scale(hypocentre["depth"], 1000)},
     }
-
-
-def _event(text: Text, fields: Fields) -> dict[str, Any]:
-    """Return origin time, hypocentre and local magnitude of the event."""
-    depth = number_field(text, fields, "Depth(km)")
-    return {
-        "time": _time(text, fields, "Origin Time(GMT+08)"),
-        "latitude": number_field(text, fields, "EpicenterLatitude(N)"),
-        "longitude": number_field(text, fields, "EpicenterLongitude(E)"),
-        "depth": metres(depth),
-        "magnitude": number_field(text, fields, "Magnitude(Ml)"),
-    }
-
-
-def _time(text: Text, fields: Fields, name: str) -> UTCDateTime | None:
-    """Return a time in UTC; clocks of the format are eight hours ahead."""
-    time = _TIME.match(text_field(fields, name) or "")
-    if time is None:
-        return None
-    return utc_from_words(text, fields[name].line, name, time.groups(), _HOURS_AHEAD)

@@ -3,39 +3,27 @@
 import re
 from typing import Any
 
-from obspy import Stream, UTCDateTime
+from obspy import Stream
 
-from per_obspy.checks import FloatArray
-from per_obspy.formats.text.conversions import utc_from_words
-from per_obspy.formats.text.fields import (
-    Fields,
-    count_field,
-    interval_field,
-    number_field,
-    read_fields,
-    required_field,
-    text_field,
-)
+from per_obspy.formats.text.header import CLOCK, corners, read_fields, word_in
 from per_obspy.formats.text.lines import (
     DECIMAL,
-    Text,
     WaveformFile,
     block_lines,
     fixed_block,
     head,
-    line_at,
+    match_line,
     no_more,
-    quoted,
     read_text,
-    refuse,
 )
-from per_obspy.formats.text.vocabulary import corners, orientation, trace
+from per_obspy.formats.text.vocabulary import orientation, trace
 
 _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5
-_TIME = re.compile(rf"(\d{{4}})-(\d{{1,2}})-(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
+_TIME = re.compile(rf"(?P<year>\d{{4}})-(?P<month>\d{{1,2}})-(?P<day>\d{{1,2}}) {CLOCK}")
 _STATION = re.compile(r"(\S+) / (.*)")
 _CORNERS = re.compile(rf"{DECIMAL}\s*+-\s*+{DECIMAL}")
+_UNIT = re.compile("m/s/s")
 
 
 def is_itaca(file: WaveformFile) -> bool:
@@ -47,53 +35,24 @@ def is_itaca(file: WaveformFile) -> bool:
 def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a corrected record of ITACA 2009: acceleration of one component, m/s2."""
     text = read_text(file)
-    fields = read_fields(text, _HEADER_LINES - 1)
-    unit = line_at(text, _HEADER_LINES - 1, "unit")
-    if "m/s/s" not in unit:
-        problem = f"{quoted(text, _HEADER_LINES - 1)} does not name m/s/s"
-        refuse(text, _HEADER_LINES - 1, "unit", problem)
-    values = _samples(text, count_field(text, fields, "Number of Data"))
-    # Words of the header
-    words = _processing(text, fields) | {"event": {"time": _event_time(text, fields)}}
-    words |= _station(text, fields)
-    words |= orientation(required_field(text, fields, "Orientation").value)
-    dt = interval_field(text, fields, "Time Increment (s)")
-    return Stream([trace(values, dt, words, text.name)])
-
-
-def _samples(text: Text, samples: int) -> FloatArray:
-    """Return the samples, which end the file."""
+    header = read_fields(text, _HEADER_LINES - 1)
+    match_line(text, _HEADER_LINES - 1, "unit", _UNIT, "{} does not name m/s/s")
+    samples = header.samples("Number of Data")
     values = fixed_block(text, _HEADER_LINES, samples, _WIDTH, _PER_LINE)
     no_more(text, _HEADER_LINES + block_lines(samples, _PER_LINE), samples)
-    return values
-
-
-def _processing(text: Text, fields: Fields) -> dict[str, Any]:
-    """Return quantity, filter and peak."""
-    band = _CORNERS.match(text_field(fields, "Filter Cut-off Frequency (Hz)") or "")
-    return {
-        "units": "m/s2",
-        "quantity": "acceleration",
+    # The civil protection (DPC) runs the network with FDSN code IT
+    header.required("Event Date & Time")
+    station = _STATION.match(header.required("Station Code / Name"))
+    # Words without a value are dropped from the trace
+    is_dpc = (header.word("Network") or "").startswith("DPC")
+    words = {
         "processing_level": "processed",
-        "corners": corners(band),
-        "header_peak": number_field(text, fields, "PGA (m/s/s)"),
+        "corners": corners(_CORNERS.match(header.word("Filter Cut-off Frequency (Hz)") or "")),
+        "header_peak": header.number("PGA (m/s/s)"),
+        "event": {"time": header.time(_TIME, "Event Date & Time")},
+        "network": "IT" if is_dpc else None,
+        "station": word_in(station),
+        "station_name": word_in(station, 2),
+        **orientation(header.required("Orientation")),
     }
-
-
-def _station(text: Text, fields: Fields) -> dict[str, Any]:
-    """Return codes and name; the civil protection (DPC) runs the network with FDSN code IT."""
-    station = _STATION.match(required_field(text, fields, "Station Code / Name").value)
-    network = text_field(fields, "Network") or ""
-    return {
-        "network": "IT" if network.startswith("DPC") else None,
-        "station": station[1] if station else None,
-        "station_name": station[2] if station else None,
-    }
-
-
-def _event_time(text: Text, fields: Fields) -> UTCDateTime | None:
-    """Return the origin time, UTC."""
-    name = "Event Date & Time"
-    line, value = required_field(text, fields, name)
-    time = _TIME.match(value)
-    return utc_from_words(text, line, name, time.groups()) if time else None
+    return Stream([trace(values, header.interval("Time Increment (s)"), words, text.name)])

@@ -1,12 +1,10 @@
 """K-NET and KiK-net: ObsPy reads them; their header is put into the words of the vocabulary."""
 
-from typing import Any
-
 from obspy import Trace
 
 from per_obspy.constants import GAL
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.vocabulary import coordinates, orientation
+from per_obspy.formats.text.vocabulary import Words, coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
 _SENSORS = "12"
@@ -26,8 +24,12 @@ def with_knet_words(record: Trace) -> Trace:
     RecordRejected
         If the file is shorter than its header promises: ObsPy reads a cut file as a shorter record.
     """
-    _refuse_cut(record)
     header = record.stats.knet
+    seconds = record.stats.npts * record.stats.delta
+    # Half a sample is rounding
+    if seconds < header.duration - record.stats.delta / 2:
+        problem = f"the header promises {header.duration:g} s, the file holds {seconds:g} s"
+        raise RecordRejected(record.id, problem)
     trace = record.copy()
     stats = trace.stats
     stats.update({"units": "counts", "quantity": "acceleration", "processing_level": "raw"})
@@ -39,7 +41,7 @@ def with_knet_words(record: Trace) -> Trace:
     return trace
 
 
-def knet_event(record: Trace) -> dict[str, Any]:
+def knet_event(record: Trace) -> Words:
     """
     Return the event of a K-NET header, in the words of the vocabulary.
 
@@ -76,14 +78,3 @@ def require_whole_numbers(content: bytes, name: str) -> None:
     if is_sample_line and (len(line_before.rstrip()) - len(last)) % _WIDTH:
         problem = f"last number: the file ends inside a column after {last[-_WIDTH:]!r}"
         raise RecordRejected(name, problem)
-
-
-def _refuse_cut(record: Trace) -> None:
-    """Refuse a record that is shorter than its header promises."""
-    promised = record.stats.knet.duration
-    seconds = record.stats.npts * record.stats.delta
-    # Half a sample is rounding
-    if seconds < promised - record.stats.delta / 2:
-        raise RecordRejected(
-            record.id, f"the header promises {promised:g} s, the file holds {seconds:g} s"
-        )

@@ -5,17 +5,12 @@ from typing import Any
 from obspy import Stream
 
 from per_obspy.formats import csmip
-from per_obspy.formats.text.lines import WaveformFile, head
+from per_obspy.formats.text.lines import WaveformFile
 
 
 def is_renadic(file: WaveformFile) -> bool:
     """Check whether a file starts like a record of RENADIC."""
-    start = head(file, 1200).upper()
-    return (
-        start.startswith(b"UNCORRECTED ACCELEROGRAM DATA")
-        and b"UNITS OF UNCOR" in start
-        and b"RENADIC" in start
-    )
+    return csmip.volume_1_agency(file) == "RENADIC"
 
 
 def read_renadic(file: WaveformFile, **_unused: Any) -> Stream:

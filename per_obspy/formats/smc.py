@@ -7,8 +7,7 @@ from typing import Any
 from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats.text.conversions import first_known, metres
-from per_obspy.formats.text.film import Film, even_film
+from per_obspy.formats.text.header import first_known, scale, word_in
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -18,20 +17,26 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
+    match_line,
     no_more,
-    quoted,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import Words, coordinates, horizontal, trace
+from per_obspy.formats.text.volumes import Film, read_film
 
-_TEXT_LINES, _INTEGER_LINES, _NUMBER_LINES = 11, 6, 16
+_TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 11, 6, 27
 _INTEGERS, _REALS = 48, 50
+_WIDTH, _PER_LINE = 10, 8  # of integers and samples
 _NO_INTEGER, _NO_REAL = -32768, 1e38
-_TITLE = re.compile(
-    r"[1-4] (UNCORRECTED ACCELEROGRAM|CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*+"
-)
-_QUANTITIES = {"VELOCITY": ("velocity", "m/s"), "DISPLACEMENT": ("displacement", "m")}
+_RAW = "UNCORRECTED ACCELEROGRAM"
+_KINDS = {
+    _RAW: {"processing_level": "raw"},
+    "CORRECTED ACCELEROGRAM": {"processing_level": "processed"},
+    "VELOCITY": {"processing_level": "processed", "quantity": "velocity", "units": "m/s"},
+    "DISPLACEMENT": {"processing_level": "processed", "quantity": "displacement", "units": "m"},
+}
+_TITLE = re.compile(rf"^[1-4] ({'|'.join(_KINDS)})\s*+$")
 _STATION = re.compile(r"station = (.*?)\s*+component=")
 _MODEL = re.compile(r"inst type=(.*?)\s++data source = (.*)")
 _CENTIMETRE = 0.01  # m
@@ -40,41 +45,37 @@ _CENTIMETRE = 0.01  # m
 def is_smc(file: WaveformFile) -> bool:
     """Check whether a file starts like SMC."""
     lines = head_lines(file, 200)
-    return len(lines) > 2 and bool(_TITLE.fullmatch(lines[0])) and lines[1].startswith("*")
+    return len(lines) > 2 and bool(_TITLE.match(lines[0])) and lines[1].startswith("*")
 
 
 def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     """Read SMC: one component, m/s2, m/s or m."""
     text = read_text(file)
-    title = _TITLE.fullmatch(text.lines[0])
-    if title is None:
-        refuse(text, 0, "title", f"{quoted(text, 0)} is not that of a time series")
-    # Integers and reals of the header
+    title = match_line(text, 0, "title", _TITLE, "{} is not that of a time series")[1]
     line_at(text, _TEXT_LINES, "integers")
-    integers = fixed_block(text, _TEXT_LINES, _INTEGERS, 10, 8)
-    reals = fixed_block(text, _TEXT_LINES + _INTEGER_LINES, _REALS, 15, 5)
-    values, dt, film = _samples(text, integers, reals, title[1])
-    # Words of the header
-    words = _quantity(title[1]) | {"starttime": _start(text, integers)}
-    words |= _station(text, integers, reals) | _numbers(reals) | _direction(integers)
-    return Stream([trace(values, dt, words | film, text.name)])
+    # Integers and reals of the header, where they are known
+    whole = fixed_block(text, _TEXT_LINES, _INTEGERS, _WIDTH, _PER_LINE)
+    real = fixed_block(text, _TEXT_LINES + _INTEGER_LINES, _REALS, 15, 5)
+    integers = [None if number == _NO_INTEGER else int(number) for number in whole]
+    reals = [float(number) if abs(number) < _NO_REAL else None for number in real]
+    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{whole[16]:.17g}")
+    # Samples follow the comments
+    first = _HEADER_LINES + max(integers[15] or 0, 0)
+    values, dt, film = _samples(text, first, samples, title, float(real[1]))
+    words = _station(text, integers, reals) | _motion(text, integers, reals) | film
+    return Stream([trace(_CENTIMETRE * values, dt, words | _KINDS[title], text.name)])
 
 
 def _samples(
-    text: Text, integers: FloatArray, reals: FloatArray, title: str
-) -> tuple[FloatArray, float, dict[str, Any]]:
-    """Return the samples in SI, their interval, s, and the words of digitised film."""
-    comments = 0 if integers[15] == _NO_INTEGER else int(integers[15])
-    first = _TEXT_LINES + _NUMBER_LINES + max(comments, 0)
-    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:.17g}")
-    # Film has no rate: its samples are pairs of time and value
-    if title.startswith("UNCORRECTED") and _real(reals, 1) is None:
-        film = _film(text, first, samples)
-        return _CENTIMETRE * film.values, film.dt, film.words
-    rate = interval(text, _TEXT_LINES + _INTEGER_LINES, "sampling rate", float(reals[1]))
+    text: Text, first: int, samples: int, title: str, rate: float
+) -> tuple[FloatArray, float, Words]:
+    """Return the samples, their interval, s, and the words of film: uncorrected without a rate."""
+    if title == _RAW and not abs(rate) < _NO_REAL:
+        return _film(text, first, samples)[:3]
+    rate = interval(text, _TEXT_LINES + _INTEGER_LINES, "sampling rate", rate)
+    values = fixed_block(text, first, samples, _WIDTH, _PER_LINE)
     # The samples end the file
-    values = _CENTIMETRE * fixed_block(text, first, samples, 10, 8)
-    no_more(text, first + block_lines(samples, 8), samples)
+    no_more(text, first + block_lines(samples, _PER_LINE), samples)
     return values, 1 / rate, {}
 
 
@@ -82,98 +83,77 @@ def _film(text: Text, first: int, samples: int) -> Film:
     """Return a digitised trace, whose header counts the pairs or the numbers in them."""
     # The length of the file decides which of both it counts; most files of the USGS have a line
     # more, whose times come after a pause
-    lines, of_numbers, of_pairs = (
-        len(text.lines) - first,
-        block_lines(samples, 8),
-        block_lines(2 * samples, 8),
-    )
+    lines = len(text.lines) - first
+    of_numbers, of_pairs = (block_lines(size, _PER_LINE) for size in (samples, 2 * samples))
     if samples % 2 == 0 and lines in (of_numbers, of_numbers + 1) and lines < of_pairs:
         samples //= 2
-    pairs = fixed_block(text, first, 2 * samples, 10, 8).reshape(-1, 2)
-    end = first + block_lines(2 * samples, 8)
-    has_line_more = len(text.lines) == end + 1
-    if not has_line_more:
-        no_more(text, end, samples)
-    film = even_film(text, first, pairs, 4)
-    if has_line_more:
+    film = read_film(text, first, samples, _WIDTH, _PER_LINE // 2)
+    if len(text.lines) == film.next_line + 1:
         film.words["notes"].append("a line after the last pair is left out")
+    else:
+        no_more(text, film.next_line, samples)
     return film
 
 
-def _quantity(title: str) -> dict[str, Any]:
-    """Return quantity, unit and processing level."""
-    quantity, unit = _QUANTITIES.get(title, ("acceleration", "m/s2"))
-    level = "raw" if title.startswith("UNCORRECTED") else "processed"
-    return {"quantity": quantity, "units": unit, "processing_level": level}
-
-
-def _real(reals: FloatArray, index: int) -> float | None:
-    """Return a real number of the header, or None where it is unknown."""
-    return float(reals[index]) if abs(reals[index]) < _NO_REAL else None
-
-
-def _start(text: Text, integers: FloatArray) -> UTCDateTime | None:
-    """Return the time of the first sample, whose date is year and day of the year."""
-    year, day, hour, minute, second, millisecond = (int(value) for value in integers[1:7])
-    if _NO_INTEGER in (year, day, hour, minute):
-        return None
-    # Seconds and their fraction may be missing
-    second = 0 if second == _NO_INTEGER else second
-    millisecond = 0 if millisecond == _NO_INTEGER else millisecond
-    try:
-        new_year = datetime(year, 1, 1, tzinfo=UTC)
-        since = timedelta(
-            days=day - 1, hours=hour, minutes=minute, seconds=second, milliseconds=millisecond
-        )
-        return UTCDateTime(new_year + since)
-    except (ValueError, OverflowError) as error:
-        refuse(text, _TEXT_LINES, "time", f"{year} day {day} is no date ({error})")
-
-
-def _station(text: Text, integers: FloatArray, reals: FloatArray) -> dict[str, Any]:
-    """Return codes, name, coordinates and instrument of the station."""
-    name = _STATION.match(text.lines[5])
+def _station(text: Text, integers: list[int | None], reals: list[float | None]) -> Words:
+    """Return codes, name, place and instrument of the station."""
     model = _MODEL.match(text.lines[7])
-    number = int(integers[29])
     # Where the station has no number, its code is in the text
+    number = integers[29]
     return {
-        "network": "NP" if model and model[2].strip() == "USGS" else None,
-        "station": text.lines[2].strip() if number == _NO_INTEGER else str(number),
-        "station_name": name[1] if name else None,
-        "coordinates": coordinates(_real(reals, 10), _real(reals, 11), _real(reals, 12)),
+        "network": "NP" if (word_in(model, 2) or "").strip() == "USGS" else None,
+        "station": text.lines[2].strip() if number is None else str(number),
+        "station_name": word_in(_STATION.match(text.lines[5])),
+        "coordinates": coordinates(*reals[10:13]),
         "instrument": {
-            "model": model[1] if model else None,
-            "natural_frequency": _real(reals, 21),
-            "damping": _real(reals, 22),
+            "model": word_in(model),
+            "natural_frequency": reals[21],
+            "damping": reals[22],
         },
     }
 
 
-def _numbers(reals: FloatArray) -> dict[str, Any]:
-    """Return filter, peak and event from the real numbers of the header."""
-    extremes = (_real(reals, 29), _real(reals, 31))
-    peaks = [abs(extreme) * _CENTIMETRE for extreme in extremes if extreme is not None]
-    # Magnitude: moment, or else local, or else surface wave
-    event = {
-        "latitude": _real(reals, 2),
-        "longitude": _real(reals, 3),
-        "depth": metres(_real(reals, 4)),
-        "magnitude": first_known(_real(reals, index) for index in (5, 7, 6)),
-    }
+def _motion(text: Text, integers: list[int | None], reals: list[float | None]) -> Words:
+    """Return time, filter, peak, event and direction of a record."""
+    peaks = [abs(extreme) for extreme in (reals[29], reals[31]) if extreme is not None]
+    # Numbers that are unknown are dropped from the trace
     return {
-        "corners": {"highpass": _real(reals, 32), "lowpass": _real(reals, 34)},
-        "header_peak": max(peaks, default=None),
-        "event": event,
+        "starttime": _start(text, integers),
+        "corners": {"highpass": reals[32], "lowpass": reals[34]},
+        "header_peak": scale(max(peaks, default=None), _CENTIMETRE),
+        # Magnitude: moment, or else local, or else surface wave
+        "event": {
+            "latitude": reals[2],
+            "longitude": reals[3],
+            "depth": scale(reals[4], 1000),
+            "magnitude": first_known((reals[5], reals[7], reals[6])),
+        },
+        **_direction(integers),
     }
 
 
-def _direction(integers: FloatArray) -> dict[str, float]:
+def _start(text: Text, integers: list[int | None]) -> UTCDateTime | None:
+    """Return the time of the first sample, whose date is year and day of the year."""
+    year, day, hour, minute, second, millisecond = integers[1:7]
+    if year is None or day is None or hour is None or minute is None:
+        return None
+    # Seconds and their fraction may be missing
+    try:
+        return UTCDateTime(
+            datetime(year, 1, 1, tzinfo=UTC)
+            + timedelta(day - 1, second or 0, 0, millisecond or 0, minute, hour)
+        )
+    except (ValueError, OverflowError) as error:
+        refuse(text, _TEXT_LINES, "time", f"{year} day {day} is no date ({error})")
+
+
+def _direction(integers: list[int | None]) -> dict[str, float]:
     """
     Return the orientation.
 
     In the first number 0 is up, 180 is down, and 90 leaves the azimuth to the second.
     """
-    vertical, azimuth = int(integers[12]), int(integers[13])
+    vertical, azimuth = integers[12:14]
     if vertical in (0, 180):
         return {"sensor_dip": -90.0 if vertical == 0 else 90.0}
-    return horizontal(float(azimuth)) if azimuth != _NO_INTEGER else {}
+    return {} if azimuth is None else horizontal(float(azimuth))

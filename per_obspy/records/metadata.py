@@ -21,12 +21,14 @@ from per_obspy.formats.text.vocabulary import horizontal
 from per_obspy.names import code_problem
 from per_obspy.processing.instrument_response import with_overall_sensitivity
 from per_obspy.records.coordinate_sources import STATIONXML, Place, place_noted, table_of
-from per_obspy.records.simulation.station_metadata import MARK
 from per_obspy.units import unit_of_si
 
 _CODES = ("network", "station", "location", "channel")
 
 _PLACE = ("latitude", "longitude", "elevation")
+
+#: beginning of the comment by which simulated stations are known
+SIMULATION_MARK = "SIMULATED by per_obspy"
 
 
 def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
@@ -258,7 +260,7 @@ def _comment_words(trace: Trace, inventory: Inventory | None) -> dict[str, str]:
 def _is_simulated(trace: Trace, inventory: Inventory | None) -> bool:
     """Return whether the trace's station is one that this package simulated, by its comment."""
     for station in _stations(trace, inventory):
-        if any((comment.value or "").startswith(MARK) for comment in station.comments):
+        if any((comment.value or "").startswith(SIMULATION_MARK) for comment in station.comments):
             return True
     return False
 

@@ -26,7 +26,7 @@ import pyarrow.parquet as pq
 from figures import note
 
 from per_obspy.config import Simulation, load
-from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.simulation.buildings import simulated_pairs
 from per_obspy.spectra.storage import read_spectra
 
 SIZES = (10_000, 100_000)

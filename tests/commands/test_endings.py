@@ -9,7 +9,7 @@ import re
 import pytest
 
 from per_obspy.config import Scenario
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 from ..pipeline.small_run import plain_figures, write_smallest_configuration
 

@@ -7,7 +7,7 @@ import pytest
 
 from per_obspy.commands.info import HEIGHT, WIDTH
 from per_obspy.config import Scenario
-from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
+from per_obspy.simulation.earthquake import Simulation, simulate, write_simulation
 
 PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
 

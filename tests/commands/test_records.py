@@ -11,7 +11,7 @@ from fdsn_server import FdsnServer, serving, status
 
 from per_obspy.config import Scenario
 from per_obspy.pipeline.run import run
-from per_obspy.records.simulation.earthquake import Simulation, simulate
+from per_obspy.simulation.earthquake import Simulation, simulate
 
 CONFIGURATION = """
 name = "fetched"

@@ -6,7 +6,7 @@ import pytest
 
 from per_obspy.commands.run import _earthquake_lines, _simulated_line
 from per_obspy.config import Scenario
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
 SMALL = ("spectra.count=5", "screening.exact=false", "screening.largest_distance=1e5", "workers=1")

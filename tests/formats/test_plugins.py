@@ -8,8 +8,8 @@ Covers, on one made-up file of each format or more,
   ``per_obspy.formats.geonet``, ``per_obspy.formats.itaca``, ``per_obspy.formats.nsmn``,
   ``per_obspy.formats.renadic``, ``per_obspy.formats.smc``, ``per_obspy.formats.unam`` and
   ``per_obspy.formats.usc``;
-* the headers that several of them share: ``per_obspy.formats.text.csmip_header`` and
-  ``per_obspy.formats.text.dyna_header``.
+* the headers that several of them share: ``per_obspy.formats.csmip`` and
+  ``per_obspy.formats.dyna``.
 """
 
 import io

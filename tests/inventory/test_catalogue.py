@@ -18,7 +18,7 @@ from per_obspy.inventory.catalogue import (
     touch,
     verified_file,
 )
-from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.simulation.buildings import simulated_pairs
 
 CHECKOUT = Path(__file__).parents[2]
 ORIGIN = Origin(

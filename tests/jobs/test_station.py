@@ -14,8 +14,8 @@ from per_obspy.jobs.parallel import DIED
 from per_obspy.jobs.station import StationJob, do_stations, earlier_station
 from per_obspy.records.event_file import read_event_file
 from per_obspy.records.folder import read_station
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import find_path_sources
+from per_obspy.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.storage import read_spectra
 
 GRID = Spectra(count=5, dampings=(0.05,), azimuth_step=90)

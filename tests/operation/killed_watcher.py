@@ -32,7 +32,7 @@ from per_obspy.files import is_part  # noqa: E402 - after the path
 from per_obspy.operation.watch import watch_once  # noqa: E402 - after the path
 from per_obspy.pipeline import report  # noqa: E402 - after the path
 from per_obspy.pipeline.results import report_files  # noqa: E402 - after the path
-from per_obspy.records.simulation.earthquake import Simulation  # noqa: E402 - after the path
+from per_obspy.simulation.earthquake import Simulation  # noqa: E402 - after the path
 
 #: Tables that must be the same to the byte.
 TABLES = ("risk.parquet", "stations.csv", "rejected.csv", "rows.parquet", "buildings.parquet")

@@ -12,7 +12,7 @@ import pytest
 from per_obspy.commands.run import print_result
 from per_obspy.config import Scenario
 from per_obspy.pipeline.run import report, run, screen
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 from .small_run import InProcess
 

@@ -9,8 +9,8 @@ from seedlink_server import seedlink
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.fetch import fetch_configured, fetch_event
-from per_obspy.records.simulation.earthquake import simulate
 from per_obspy.records.sources import fetched_records, find_sources
+from per_obspy.simulation.earthquake import simulate
 
 CONFIGURATION = """\
 name = "x"

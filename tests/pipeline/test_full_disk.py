@@ -22,7 +22,7 @@ from per_obspy.files import is_part
 from per_obspy.jobs import station as jobs
 from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
-from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.simulation.earthquake import simulate
 
 from .small_run import (
     InProcess,

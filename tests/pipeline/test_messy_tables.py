@@ -21,7 +21,7 @@ from per_obspy import cli, read_pairs
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.suspicions import ROW_SUSPICIONS
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 from .small_run import SPECTRA, plain_reports
 

@@ -10,9 +10,9 @@ import pytest
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import Origin, add_inventory
-from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs.ground_files import StationFile
 from per_obspy.pipeline.pairs import named_files, pair_files
+from per_obspy.simulation.buildings import simulated_pairs
 
 from .small_run import write_configuration
 

@@ -19,7 +19,7 @@ from per_obspy.progress import silent
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.processed_files import described, write_description, write_processed
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.station import station_spectra
 from per_obspy.tables.station_summary import RECORD_COLUMNS
 from per_obspy.tables.table_files import rounded

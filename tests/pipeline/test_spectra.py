@@ -13,7 +13,7 @@ from per_obspy.pipeline.spectra import plot_station, spectra_of
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.progress import silent
 from per_obspy.records.processed_files import write_description, write_processed
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 GRID = Spectra(count=8, dampings=(0.05,), azimuth_step=90)

@@ -21,7 +21,7 @@ from obspy import Inventory, Stream, UTCDateTime, read
 from obspy.core.event import Catalog, Event, Origin
 from obspy.geodetics import locations2degrees
 
-from per_obspy.records.simulation.earthquake import Simulation
+from per_obspy.simulation.earthquake import Simulation
 
 Fault = Callable[["_Handler", bytes], None]
 

@@ -22,7 +22,7 @@ from per_obspy.records.asdf import (
 )
 from per_obspy.records.event_file import read_event
 from per_obspy.records.metadata import metadata_text
-from per_obspy.records.simulation.earthquake import Simulation, simulate
+from per_obspy.simulation.earthquake import Simulation, simulate
 
 PROCESSED = json.dumps({"standard": {"process_level": "corrected physical units"}})
 CORNERS = json.dumps({"corner_frequencies": {"type": "snr", "highpass": 0.1, "lowpass": 30.0}})

@@ -21,9 +21,8 @@ from per_obspy.records.contents.input_files import input_files
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
-from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
-from per_obspy.records.simulation.station_metadata import scenario_event
 from per_obspy.records.sources import find_path_sources, find_sources
+from per_obspy.simulation.earthquake import Simulation, scenario_event, simulate, write_simulation
 
 CHECKOUT = Path(__file__).parents[2]
 

@@ -8,13 +8,13 @@ names the fields, one line holds their values.
 import csv
 import re
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from obspy import UTCDateTime
 
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.conversions import metres
-from per_obspy.formats.text.station_table import StationRow, bare_name
+from per_obspy.formats.text.station_table import StationRow, bare_name, number_within
+from per_obspy.formats.text.vocabulary import Words
 
 _MARK = b"event.ev_sourcedb.shortname,"
 
@@ -28,6 +28,14 @@ _RANGES = {
     "event.longitude": (-180.0, 180.0),
     "event.focaldepth": (0.0, 800.0),
     "event.pref_mag": (0.0, 10.0),
+}
+
+#: field -> word of the event; its depth is in km
+_EVENT = {
+    "event.latitude": "latitude",
+    "event.longitude": "longitude",
+    "event.focaldepth": "depth",
+    "event.pref_mag": "magnitude",
 }
 
 #: Words of the time in its field.
@@ -48,7 +56,7 @@ class ItacaMetadata(NamedTuple):
     """
 
     row: StationRow
-    event: dict[str, Any]
+    event: Words
 
 
 def is_itaca_metadata(start: bytes) -> bool:
@@ -73,26 +81,28 @@ def read_itaca_metadata(name: str, content: bytes) -> ItacaMetadata:
         If it does not hold one line of values, or the station has no code or place.
     """
     fields = _fields(name, content.decode("utf-8", "replace"))
-    latitude, longitude = _number(name, fields, "station.latitude"), None
-    if latitude is not None:
-        longitude = _number(name, fields, "station.longitude")
+    numbers = {
+        field: number_within(name, 2, field, fields[field], limits)
+        for field, limits in _RANGES.items()
+        if fields.get(field)
+    }
     # Records name the station by its number, people by its code
-    words = [fields.get(field, "") for field in ("station.sourceid", "station.oid", "station.code")]
-    names = tuple(dict.fromkeys(bare_name(word) for word in words if bare_name(word)))
-    if latitude is None or longitude is None or not names:
+    words = [fields.get(f"station.{field}", "") for field in ("sourceid", "oid", "code")]
+    names = tuple(dict.fromkeys(filter(None, map(bare_name, words))))
+    if not names or not {"station.latitude", "station.longitude"} <= numbers.keys():
         raise RecordRejected(name, "line 2: station.code, latitude or longitude is missing")
     # A station without a network fits any
     row = StationRow(
         "",
         names,
-        latitude,
-        longitude,
-        _number(name, fields, "station.altitude"),
-        _number(name, fields, "station.vs30"),
+        numbers["station.latitude"],
+        numbers["station.longitude"],
+        numbers.get("station.altitude"),
+        numbers.get("station.vs30"),
         fields.get("station.ec8", "")[:40],
         re.split(r"[/\\]", name)[-1],
     )
-    return ItacaMetadata(row, _event(name, fields))
+    return ItacaMetadata(row, _event(name, fields.get("event.datetime", ""), numbers))
 
 
 def _fields(name: str, text: str) -> dict[str, str]:
@@ -107,37 +117,16 @@ def _fields(name: str, text: str) -> dict[str, str]:
     return {field.strip(): value.strip() for field, value in zip(*rows, strict=True)}
 
 
-def _number(name: str, fields: dict[str, str], field: str) -> float | None:
-    """Return a number within its range, None where it is missing."""
-    word = fields.get(field, "")
-    if not word:
-        return None
-    smallest, largest = _RANGES[field]
-    # Neither nan nor inf nor long runs of digits
-    is_decimal = re.fullmatch(r"[-+]?\d{1,20}(\.\d{0,30})?", word)
-    if is_decimal is None or not smallest <= float(word) <= largest:
-        problem = f"{word[:40]!r} is not a number from {smallest:g} to {largest:g}"
-        raise RecordRejected(name, f"line 2, {field}: {problem}")
-    return float(word)
-
-
-def _event(name: str, fields: dict[str, str]) -> dict[str, Any]:
-    """Return time, hypocentre and magnitude of the event."""
-    time = fields.get("event.datetime", "")
-    # Facts that the file does not have stay absent
-    event = {
-        "time": _time(name, time) if _TIME.fullmatch(time) else None,
-        "latitude": _number(name, fields, "event.latitude"),
-        "longitude": _number(name, fields, "event.longitude"),
-        "depth": metres(_number(name, fields, "event.focaldepth")),
-        "magnitude": _number(name, fields, "event.pref_mag"),
-    }
-    return {word: value for word, value in event.items() if value is not None}
-
-
-def _time(name: str, words: str) -> UTCDateTime:
-    """Return an origin time, UTC."""
+def _event(name: str, time: str, numbers: dict[str, float]) -> Words:
+    """Return time, hypocentre and magnitude of the event, as far as they are known."""
+    event: Words = {word: numbers[field] for field, word in _EVENT.items() if field in numbers}
+    if "depth" in event:
+        event["depth"] *= 1000.0
+    # A time that is written in another way is unknown
+    if not _TIME.fullmatch(time):
+        return event
     try:
-        return UTCDateTime(datetime.fromisoformat(words).replace(tzinfo=UTC))
+        moment = datetime.fromisoformat(time).replace(tzinfo=UTC)
     except ValueError as error:
-        raise RecordRejected(name, f"line 2, event.datetime: {words} is no time") from error
+        raise RecordRejected(name, f"line 2, event.datetime: {time} is no time") from error
+    return {"time": UTCDateTime(moment), **event}

@@ -1,11 +1,10 @@
 """
-Text files of samples: lines, header fields and blocks of numbers.
+Text files of samples: lines, numbers and blocks of numbers.
 
 Every fault is reported with its file, line and field.
 """
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, NoReturn
 
@@ -20,16 +19,26 @@ WaveformFile = str | Path | BinaryIO
 #: characters of a decimal number; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
+#: what may follow the last line
+_PADDING = b"\x00\x1a\r\n "
+
 #: largest numbers of characters of a line and a number; damaged files may have millions
 LONGEST_LINE, LONGEST_NUMBER = 2000, 40
+
+#: characters of a line that a message quotes
+_QUOTED = 80
 
 #: last lines whose numbers are compared with the last one; numbers of different forms from which on
 #: the shortest of all is taken for a part of one; lines that end alike from which on they do so by
 #: their format, not by chance (reasoned)
 _COMPARED, _MANY, _FEW = 1001, 100, 20
 
-#: a decimal number in a regular expression; longer runs of digits are no number
-DECIMAL = r"(-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d))"
+#: a decimal number in a regular expression, and the same as a group; longer runs of digits are none
+NUMBER = r"-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d)"
+DECIMAL = f"({NUMBER})"
+
+#: a whole word that is a number, perhaps with an exponent
+_WORD = re.compile(r" *+[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][-+]?+\d++)?+ *+", re.ASCII)
 
 
 class Text(NamedTuple):
@@ -74,27 +83,18 @@ def read_text(file: WaveformFile) -> Text:
         name, content = str(getattr(file, "name", "open file")), file.read()
     else:
         name, content = str(file), Path(file).read_bytes()
-    text = Text(name, _lines(content), is_ended(content))
+    # A byte ends the last word of a whole file; zeros may fill a place that was never cut
+    padding = content[len(content.rstrip(_PADDING)) :]
+    text = Text(name, _lines(content), bool(padding.strip(b"\x00")))
     # Searching and padding take time and memory that grow with the longest line
-    for line, content in enumerate(text.lines):
-        if len(content) > LONGEST_LINE:
-            refuse(text, line, "line", f"{len(content)} characters, at most {LONGEST_LINE}")
+    for line, row in enumerate(text.lines):
+        if len(row) > LONGEST_LINE:
+            refuse(text, line, "line", f"{len(row)} characters, at most {LONGEST_LINE}")
     return text
 
 
-def is_ended(content: bytes) -> bool:
-    r"""
-    Check whether a byte ends the last word of a file; zeros may fill a place that was never cut.
-
-    >>> is_ended(b"0.12\r\n"), is_ended(b"0.1"), is_ended(b"0.1\0\0")
-    (True, False, False)
-    """
-    padding = content[len(content.rstrip(b"\x00\x1a\r\n ")) :]
-    return bool(padding.strip(b"\x00"))
-
-
 def _lines(content: bytes) -> list[str]:
-    text = content.decode("latin-1").rstrip("\x00\x1a\r\n ")
+    text = content.rstrip(_PADDING).decode("latin-1")
     return text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
@@ -110,9 +110,19 @@ def line_at(text: Text, line: int, field: str) -> str:
     return text.lines[line]
 
 
-def quoted(text: Text, line: int, length: int | None = None) -> str:
-    """Return a line in quotes for a message, without blanks around it and cut to a length."""
-    return repr(text.lines[line].strip()[:length])
+def quote(text: Text, line: int) -> str:
+    """Return the beginning of a line in quotes for a message, without blanks around it."""
+    return repr(text.lines[line].strip()[:_QUOTED])
+
+
+def match_line(
+    text: Text, line: int, field: str, pattern: re.Pattern[str], problem: str = "{} gives none"
+) -> re.Match[str]:
+    """Return what a pattern finds on a line; ``{}`` in the problem is the line in quotes."""
+    match = pattern.search(line_at(text, line, field))
+    if match is None:
+        refuse(text, line, field, problem.format(quote(text, line)))
+    return match
 
 
 def finite_number(text: Text, line: int, field: str, word: str) -> float:
@@ -121,12 +131,11 @@ def finite_number(text: Text, line: int, field: str, word: str) -> float:
     length = len(word.strip())
     if length > LONGEST_NUMBER:
         refuse(text, line, field, f"{length} characters, a number has at most {LONGEST_NUMBER}")
-    try:
-        number = float(word)
-    except ValueError:
-        refuse(text, line, field, f"{word.strip()!r} is not a number")
-    if not np.isfinite(number) or "_" in word:
-        refuse(text, line, field, f"{word.strip()!r} is not a finite number")
+    if not _WORD.fullmatch(word):
+        refuse(text, line, field, f"{word!r} is not a number")
+    number = float(word)
+    if not np.isfinite(number):
+        refuse(text, line, field, f"{word!r} is not a finite number")
     return number
 
 
@@ -140,13 +149,22 @@ def count(text: Text, line: int, field: str, word: str) -> int:
 
 def interval(text: Text, line: int, field: str, value: str | float) -> float:
     """Return a sampling interval, s, or a sampling rate, Hz: from 1e-5 to 1e5."""
-    if isinstance(value, str):
-        number = finite_number(text, line, field, value)
-    else:
-        number = float(value)
+    number = finite_number(text, line, field, value) if isinstance(value, str) else value
     if not 1e-5 <= number <= 1e5:
         refuse(text, line, field, f"must be positive and plausible, got {str(value).strip()!r}")
     return number
+
+
+def block_lines(samples: int, per_line: int) -> int:
+    """Return the number of lines of a block."""
+    return -(-samples // per_line)
+
+
+def no_more(text: Text, line: int, samples: int) -> None:
+    """Refuse lines after the last sample."""
+    if line < len(text.lines):
+        problem = f"more lines than the {samples} samples that the header promises take"
+        refuse(text, line, "samples", problem)
 
 
 def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int) -> FloatArray:
@@ -172,44 +190,73 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
     full = width * per_line
     if width > LONGEST_NUMBER or full > LONGEST_LINE:
         refuse(text, start - 1, "format", f"{per_line} numbers of {width} characters a line")
-    rows = _block_rows(text, start, block_lines(samples, per_line), samples)
-    _refuse_long_rows(text, start, rows, full)
+    rows = _block_rows(text, start, samples, per_line, full)
     # A line that is not full lacks a number; padding many of them would fill the memory
-    if any(len(row) <= full - width for row in rows[:-1]):
-        _refuse_fixed(text, start, rows, samples, width, per_line)
-    if start + len(rows) == len(text.lines):
-        _refuse_short_column(text, rows, width)
-    values = _columns(rows, samples, width, full)
+    values = None
+    if all(len(row) > full - width for row in rows[:-1]):
+        if start + len(rows) == len(text.lines):
+            _refuse_short_column(text, rows, width)
+        values = _columns(rows, samples, width, full)
+    # Search for the wrong number only when there is one
     if values is None:
         _refuse_fixed(text, start, rows, samples, width, per_line)
     return values
+
+
+def _block_rows(text: Text, start: int, samples: int, per_line: int, full: int) -> list[str]:
+    """Return the lines of a block without trailing blanks, none longer than a full one."""
+    lines = block_lines(samples, per_line)
+    rows = [row.rstrip() for row in text.lines[start : start + lines]]
+    if len(rows) < lines:
+        promise = f"the header promises {samples} on {lines} lines"
+        problem = f"{promise}, the file ends after {len(rows)} of them"
+        refuse(text, len(text.lines), "samples", problem)
+    # Longer lines belong to another format
+    if max(map(len, rows)) > full:
+        index, row = next((index, row) for index, row in enumerate(rows) if len(row) > full)
+        refuse(text, start + index, "samples", f"{len(row)} characters, the format has {full}")
+    return rows
 
 
 def _columns(rows: list[str], samples: int, width: int, full: int) -> FloatArray | None:
     """Return the numbers of a block in columns; None if there is anything else."""
     # Pad every line to its full length, so that number i begins at character i * width
     block = "".join([row.ljust(full) for row in rows]).encode("latin-1")
-    values = _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
     # Only blanks may follow the last number, and only letters of numbers may occur anywhere
-    surplus = block[samples * width :].strip()
-    return None if surplus or block.translate(None, _NUMBER_LETTERS) else values
+    if block[samples * width :].strip() or block.translate(None, _NUMBER_LETTERS):
+        return None
+    return _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
 
 
-def block_lines(samples: int, per_line: int) -> int:
-    """Return the number of lines of a block."""
-    return -(-samples // per_line)
+def _floats(words: NDArray[np.bytes_]) -> FloatArray | None:
+    """Return words as finite numbers; None if one is not."""
+    try:
+        values = words.astype(np.float64)
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None
 
 
-def no_more(text: Text, line: int, samples: int) -> None:
-    """Refuse lines after the last sample."""
-    if line < len(text.lines):
-        problem = f"more lines than the {samples} samples that the header promises take"
-        refuse(text, line, "samples", problem)
+def _refuse_fixed(
+    text: Text, start: int, rows: list[str], samples: int, width: int, per_line: int
+) -> NoReturn:
+    """Refuse the first line of a block in columns that does not hold its share of numbers."""
+    for index, row in enumerate(rows):
+        words = [row[first : first + width] for first in range(0, len(row), width)]
+        # Name the first word that is no number by its place in the whole block
+        for sample, word in enumerate(words, index * per_line + 1):
+            finite_number(text, start + index, f"sample {sample}", word)
+        # Every line is full but the last, which holds the rest
+        expected = min(per_line, samples - index * per_line)
+        if len(words) != expected:
+            problem = f"{len(words)} numbers instead of {expected} of the {samples}"
+            refuse(text, start + index, "samples", problem)
+    refuse(text, start, "samples", "not a block of numbers")
 
 
-def free_block(text: Text, start: int, stop: int | None, samples: int | None) -> FloatArray:
+def free_block(text: Text, start: int, samples: int) -> FloatArray:
     """
-    Read numbers separated by white space on the lines from ``start`` to ``stop``.
+    Read numbers separated by white space from a line to the end of the file.
 
     Parameters
     ----------
@@ -217,17 +264,15 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
         The file.
     start : int
         Line of the first number.
-    stop : int or None
-        Line after the last number; None for the end of the file.
-    samples : int or None
-        Numbers that the header promises, dimensionless; None where it promises none.
+    samples : int
+        Numbers that the header promises, dimensionless.
 
     Returns
     -------
     samples : (n_samples,) ndarray
         In the unit of the file.
     """
-    rows = text.lines[start:stop]
+    rows = text.lines[start:]
     content = "\n".join(rows).encode("latin-1")
     words = content.split()
     values = None
@@ -237,10 +282,12 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
         values = _floats(np.array(words))
     # Search for the wrong word only when there is one
     if values is None:
-        _refuse_free(text, start, rows)
-    if stop is None:
-        _refuse_another_form(text, rows)
-    if samples is not None and len(values) != samples:
+        for index, row in enumerate(rows):
+            for word in row.split():
+                finite_number(text, start + index, "samples", word)
+        refuse(text, start, "samples", "none")
+    _refuse_another_form(text, rows)
+    if len(values) != samples:
         problem = f"the header promises {samples}, the file holds {len(values)}"
         refuse(text, start + len(rows) - 1, "samples", problem)
     return values
@@ -248,8 +295,6 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
 
 def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
     """Refuse a last number that ends at another place of its column than the others."""
-    if not text.is_ended and (len(rows[-1]) - len(rows[0][:width].rstrip())) % width:
-        _refuse_cut(text, f"{rows[-1][-width:]!r} ends before its column")
     *cells, last = [
         row[first : first + width].rstrip()
         for row in rows[-_COMPARED:]
@@ -257,7 +302,8 @@ def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
     ]
     # Numbers at the right of their columns all end at one place; at the left, their forms tell
     ends = {len(cell) for cell in cells}
-    if (len(ends) == 1 and len(last) < min(ends)) or _is_short(last, cells):
+    is_early = not text.is_ended and (len(rows[-1]) - len(rows[0][:width].rstrip())) % width
+    if is_early or (len(ends) == 1 and len(last) < min(ends)) or _is_short(last, cells):
         _refuse_cut(text, f"{last!r} ends before its column")
 
 
@@ -267,13 +313,13 @@ def _refuse_another_form(text: Text, rows: list[str]) -> None:
     endings = [row.split()[-1] for row in filled]
     forms = {_form(word) for word in endings}
     # Whole numbers have no form that shows their end
-    if not text.is_ended and (len(forms) > 1 or forms == {(-1, 0)}):
-        _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
+    is_doubtful = not text.is_ended and (len(forms) > 1 or forms == {(-1, 0)})
     # Numbers of the same place in their lines
     place = len(filled[-1].split()) - 1
     above = [row for row in filled[-_COMPARED:-1] if len(row.split()) > place]
     others = [row.split()[place] for row in above] or filled[-1].split()[:-1]
-    if _is_short(endings[-1], others) or _ends_early(filled[-1], above, place):
+    is_doubtful |= _ends_early(filled[-1], above, place)
+    if is_doubtful or _is_short(endings[-1], others):
         _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
 
 
@@ -325,74 +371,3 @@ def _refuse_cut(text: Text, problem: str) -> NoReturn:
         mend = "get the file again, or end its last line if it is whole"
         problem = f"{problem}, without an end of line after it: {mend}"
     refuse(text, len(text.lines) - 1, "last number", problem)
-
-
-def _block_rows(text: Text, start: int, lines: int, samples: int) -> list[str]:
-    """Return the lines of a block without trailing blanks."""
-    rows = [row.rstrip() for row in text.lines[start : start + lines]]
-    if len(rows) < lines:
-        promise = f"the header promises {samples} on {lines} lines"
-        problem = f"{promise}, the file ends after {len(rows)} of them"
-        refuse(text, len(text.lines), "samples", problem)
-    return rows
-
-
-def _refuse_long_rows(text: Text, start: int, rows: list[str], full: int) -> None:
-    """Refuse lines with more characters than a full line of the format."""
-    lengths = np.fromiter(map(len, rows), dtype=np.intp, count=len(rows))
-    if lengths.max() > full:
-        row = int(np.argmax(lengths > full))
-        problem = f"{lengths[row]} characters, the format has {full}"
-        refuse(text, start + row, "samples", problem)
-
-
-def _floats(words: NDArray[np.bytes_]) -> FloatArray | None:
-    """Return words as finite numbers; None if one is not."""
-    try:
-        values = words.astype(np.float64)
-    except ValueError:
-        return None
-    return values if np.isfinite(values).all() else None
-
-
-def _refuse_fixed(
-    text: Text, start: int, rows: list[str], samples: int, width: int, per_line: int
-) -> NoReturn:
-    """Refuse the first line of a block in columns that does not hold its share of numbers."""
-    for index, row in enumerate(rows):
-        words = [row[first : first + width] for first in range(0, len(row), width)]
-        # Name the first word that is no number by its place in the whole block
-        for column, word in enumerate(words):
-            if not _is_number(word):
-                sample = index * per_line + column + 1
-                refuse(text, start + index, f"sample {sample}", f"{word!r} is not a number")
-        # Every line is full but the last, which holds the rest
-        expected = min(per_line, samples - index * per_line)
-        if len(words) != expected:
-            problem = f"{len(words)} numbers instead of {expected} of the {samples}"
-            refuse(text, start + index, "samples", problem)
-    refuse(text, start, "samples", "not a block of numbers")
-
-
-def _refuse_free(text: Text, start: int, rows: list[str]) -> NoReturn:
-    """Refuse the first word of a free block that is no number."""
-    for index, word in _words(rows):
-        if len(word) > LONGEST_NUMBER:
-            problem = f"{len(word)} characters, a number has at most {LONGEST_NUMBER}"
-            refuse(text, start + index, "samples", problem)
-        if not _is_number(word):
-            refuse(text, start + index, "samples", f"{word!r} is not a number")
-    refuse(text, start, "samples", "none")
-
-
-def _words(rows: list[str]) -> Iterator[tuple[int, str]]:
-    """Yield every word with the index of its line."""
-    for index, row in enumerate(rows):
-        for word in row.split():
-            yield index, word
-
-
-def _is_number(word: str) -> bool:
-    if word.encode("latin-1").translate(None, _NUMBER_LETTERS):
-        return False
-    return _floats(np.array([word.encode("latin-1")])) is not None

@@ -22,8 +22,16 @@ _COLUMNS = {
 }
 _REQUIRED = ("station", "latitude", "longitude")
 
-#: largest absolute value: degrees, m or m/s
-_LARGEST = {"latitude": 90.0, "longitude": 180.0, "elevation": 9000.0, "vs30": 10_000.0}
+#: smallest and largest value: degrees, m or m/s
+_RANGES = {
+    "latitude": (-90.0, 90.0),
+    "longitude": (-180.0, 180.0),
+    "elevation": (-9000.0, 9000.0),
+    "vs30": (0.0, 10_000.0),
+}
+
+#: neither nan nor inf nor long runs of digits
+_DECIMAL = re.compile(r"[-+]?(\d{1,20}(\.\d{0,30})?|\.\d{1,30})")
 
 #: Beginning of the comment of a station that names the table which describes it.
 SOURCE = "coordinates from "
@@ -78,9 +86,9 @@ def is_station_table(start: bytes) -> bool:
     >>> is_station_table(b"Station;Lat;Lon\n"), is_station_table(b"time,acceleration\n")
     (True, False)
     """
-    first_line = start.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf").split("\n")[0]
+    header = start.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf").split("\n")[0]
     try:
-        return set(_REQUIRED) <= set(_places(_fields(first_line)))
+        return set(_REQUIRED) <= set(_places(_fields(header, ";" if ";" in header else ",")))
     except csv.Error:
         return False
 
@@ -105,31 +113,25 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    # Lines are counted from 1; empty ones are passed over
-    lines = text.splitlines()
-    places = _places(_line_fields(name, 1, lines[0] if lines else ""))
-    if missing := [column for column in _REQUIRED if column not in places]:
-        raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
-    # Every other line is a station or a comment
-    rows = []
-    for number, line in enumerate(lines[1:], 2):
-        if line.strip() and not line.startswith("#"):
-            fields = _line_fields(name, number, line, lines[0])
-            rows.append(_row(f"line {number}", name, fields, places))
+    # Lines are counted from 1; the header decides the separator
+    header, *lines = text.splitlines() or [""]
+    separator = ";" if ";" in header else ","
+    number, rows = 1, []
+    try:
+        places = _places(_fields(header, separator))
+        if missing := [column for column in _REQUIRED if column not in places]:
+            raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
+        # Every other line is a station, a comment or empty
+        for number, line in enumerate(lines, 2):
+            if line.strip() and not line.startswith("#"):
+                rows.append(_row(name, number, _fields(line, separator), places))
+    except csv.Error as error:
+        raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
     return tuple(rows)
 
 
-def _line_fields(name: str, number: int, line: str, header: str | None = None) -> list[str]:
-    """Return the fields of a numbered line; refuse lines that cannot be divided."""
-    try:
-        return _fields(line, header)
-    except csv.Error as error:
-        raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
-
-
-def _fields(line: str, header: str | None = None) -> list[str]:
-    """Return the fields of a line, without blanks; the header decides the separator."""
-    separator = ";" if ";" in (line if header is None else header) else ","
+def _fields(line: str, separator: str) -> list[str]:
+    """Return the fields of a line, without blanks."""
     row = next(csv.reader([line], delimiter=separator), [])
     return [field.strip() for field in row]
 
@@ -144,54 +146,43 @@ def _places(header: Sequence[str]) -> dict[str, list[int]]:
     return places
 
 
-def _row(line: str, name: str, fields: list[str], places: dict[str, list[int]]) -> StationRow:
+def _row(name: str, line: int, fields: list[str], places: dict[str, list[int]]) -> StationRow:
     """Return a row, whose numbers must be in their range."""
     words = {}
     for column, found in places.items():
         if max(found) >= len(fields):
-            raise RecordRejected(name, f"{line}: {len(fields)} columns, no {column}")
-        words[column] = [fields[place] for place in found]
+            raise RecordRejected(name, f"line {line}: {len(fields)} columns, no {column}")
+        words[column] = fields[found[0]]
     # A station may have a code, a name or both
-    names = tuple(bare_name(word) for word in words["station"] if bare_name(word))
+    names = tuple(filter(None, (bare_name(fields[place]) for place in places["station"])))
     if not names:
-        raise RecordRejected(name, f"{line}, station: empty")
-    # Only the place may not be missing
-    place = [_number(line, name, column, words[column][0]) for column in ("latitude", "longitude")]
+        raise RecordRejected(name, f"line {line}, station: empty")
+    # Only the place may not be missing; tables write 0 for an unknown velocity
+    numbers = {
+        column: number_within(name, line, column, words[column], limits)
+        for column, limits in _RANGES.items()
+        if words.get(column) or column in _REQUIRED
+    }
     return StationRow(
-        words.get("network", [""])[0].upper(),
+        words.get("network", "").upper(),
         names,
-        place[0],
-        place[1],
-        _optional_number(line, name, "elevation", words),
-        _velocity(line, name, words),
-        words.get("site_class", [""])[0][:40],
+        numbers["latitude"],
+        numbers["longitude"],
+        numbers.get("elevation"),
+        numbers.get("vs30") or None,
+        words.get("site_class", "")[:40],
         printable(re.split(r"[/\\]", name)[-1]),
     )
 
 
-def _optional_number(
-    line: str, name: str, column: str, words: dict[str, list[str]]
-) -> float | None:
-    """Return a number of a column, None where there is none."""
-    word = words.get(column, [""])[0]
-    return _number(line, name, column, word) if word else None
-
-
-def _velocity(line: str, name: str, words: dict[str, list[str]]) -> float | None:
-    """Return Vs30, m/s; tables write 0 for an unknown one, and a negative one is refused."""
-    velocity = _optional_number(line, name, "vs30", words)
-    if velocity is not None and velocity < 0:
-        raise RecordRejected(name, f"{line}, vs30: {velocity:g} is no velocity in m/s")
-    return velocity or None
-
-
-def _number(line: str, name: str, column: str, word: str) -> float:
-    """Return a decimal number of a column within its range."""
-    # Neither nan nor inf nor long runs of digits
-    is_decimal = re.fullmatch(r"[-+]?(\d{1,20}(\.\d{0,30})?|\.\d{1,30})", word)
-    if is_decimal is None or abs(float(word)) > _LARGEST[column]:
-        expected = f"a number from -{_LARGEST[column]:g} to {_LARGEST[column]:g}"
-        raise RecordRejected(name, f"{line}, {column}: {word[:40]!r} is not {expected}")
+def number_within(
+    name: str, line: int, field: str, word: str, limits: tuple[float, float]
+) -> float:
+    """Return a decimal number of a field within its range."""
+    smallest, largest = limits
+    if not _DECIMAL.fullmatch(word) or not smallest <= float(word) <= largest:
+        expected = f"a number from {smallest:g} to {largest:g}"
+        raise RecordRejected(name, f"line {line}, {field}: {word[:40]!r} is not {expected}")
     return float(word)
 
 
@@ -209,13 +200,14 @@ def located_stations(rows: Iterable[StationRow], stations: Iterable[str]) -> Inv
     table = tuple(rows)
     networks = []
     for identifier in stations:
-        network, station = identifier.split(".", 1)
+        network, code = identifier.split(".", 1)
         # A table without networks fits all of them, and so does a record without one
-        found = []
-        for row in table:
-            same_network = not row.network or not network or row.network == network.upper()
-            if same_network and bare_name(station) in row.names:
-                found.append(_station(station, row))
+        found = [
+            _station(code, row)
+            for row in table
+            if bare_name(code) in row.names
+            and (not row.network or not network or row.network == network.upper())
+        ]
         if found:
             networks.append(Network(network, stations=found))
     return Inventory(networks=networks, source="")
@@ -223,11 +215,12 @@ def located_stations(rows: Iterable[StationRow], stations: Iterable[str]) -> Inv
 
 def _station(code: str, row: StationRow) -> Station:
     """Return the description of a station; ObsPy needs a number for an elevation."""
-    words = [f"{SOURCE}{row.source or 'a table of stations'}"]
-    words += [] if row.elevation is not None else ["elevation=unknown"]
     # The ground, as the comments of StationXML have it
-    words += [f"vs30={row.vs30:g}"] if row.vs30 else []
-    words += [f"site_class={row.site_class}"] if row.site_class else []
-    elevation = 0.0 if row.elevation is None else row.elevation
-    comments = [Comment(word) for word in words]
-    return Station(code, row.latitude, row.longitude, elevation, comments=comments)
+    words = [
+        f"{SOURCE}{row.source or 'a table of stations'}",
+        "elevation=unknown" if row.elevation is None else "",
+        f"vs30={row.vs30:g}" if row.vs30 else "",
+        f"site_class={row.site_class}" if row.site_class else "",
+    ]
+    comments = [Comment(word) for word in words if word]
+    return Station(code, row.latitude, row.longitude, row.elevation or 0.0, comments=comments)

@@ -9,7 +9,6 @@ fdsnws-station, divided by ``|``.
 
 import math
 import re
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -17,8 +16,9 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy.errors import shortened
 
-#: Columns that every line needs, and largest absolute values, degrees.
+#: Columns that every line needs, columns of codes, and largest absolute values, degrees.
 _REQUIRED = ("network", "station", "latitude", "longitude")
+_CODES = ("network", "station", "location", "channel")
 _LARGEST = {"latitude": 90.0, "longitude": 180.0}
 
 #: A decimal number; ``float`` also reads ``1_0`` and ``nan``.
@@ -115,20 +115,14 @@ def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
     for number, text in enumerate(rest, 2):
         if not text.strip() or text.startswith("#"):
             continue
-        cells = [cell.strip() for cell in text.split("|")]
+        row = [cell.strip() for cell in text.split("|")]
         try:
-            lines.append(_line(number, columns, cells))
+            lines.append(_line(number, columns, row))
         except ValueError as error:
-            name = _codes(columns, cells)
-            faults.append(LineFault(number, name, str(error)))
+            codes = dict(zip(columns, row, strict=False))
+            name = ".".join(codes[name] for name in _CODES if name in codes)
+            faults.append(LineFault(number, shortened(name, 80), str(error)))
     return lines, faults
-
-
-def _codes(columns: Sequence[str], cells: Sequence[str]) -> str:
-    """Return the codes of a wrong line, as far as it has them."""
-    codes = dict(zip(columns, cells, strict=False))
-    names = ("network", "station", "location", "channel")
-    return shortened(".".join(codes[name] for name in names if name in codes), 80)
 
 
 def _split(content: bytes) -> list[str]:
@@ -136,19 +130,21 @@ def _split(content: bytes) -> list[str]:
     return re.split("\r\n|\r|\n", content.decode("utf-8", "replace"))
 
 
-def _line(number: int, columns: Sequence[str], cells: Sequence[str]) -> StationLine:
+def _line(number: int, columns: list[str], cells: list[str]) -> StationLine:
     """Return a line; raise ``ValueError`` with column and value if it is wrong."""
     if len(cells) < len(columns):
         raise ValueError(f"has {len(cells)} columns, expected {len(columns)}")
     # Columns beyond those of the header are nobody's
     row = dict(zip(columns, cells, strict=False))
-    location, channel = row.get("location", ""), row.get("channel", "")
-    if not row["station"] or ("channel" in columns and not channel):
-        raise ValueError(f"{'channel' if row['station'] else 'station'}: empty, expected a code")
+    for name in ("station", "channel"):
+        if row.get(name) == "":
+            raise ValueError(f"{name}: empty, expected a code")
+    # The location of a list is -- where it is empty
+    network, station, location, channel = (row.get(name, "") for name in _CODES)
     return StationLine(
         number,
-        row["network"],
-        row["station"],
+        network,
+        station,
         "" if location == "--" else location,
         channel,
         _degrees(row, "latitude"),
@@ -191,15 +187,15 @@ def marked_open_starts(content: bytes) -> bytes:
     >>> marked_open_starts(b"#Network|Description|StartTime\nXX|net|")
     b'#Network|Description|StartTime\nXX|net|0001-01-02T00:00:00.000000Z'
     """
-    lines = _split(content)
-    header = [field.strip().lower() for field in lines[0].lstrip("#").split("|")]
-    start = header.index("starttime") if "starttime" in header else len(header)
+    header, *lines = _split(content)
+    columns = [field.strip().lower() for field in header.lstrip("#").split("|")]
+    rows = [line.split("|") for line in lines]
+    start = columns.index("starttime") if "starttime" in columns else len(content)
     # Comments stay as they are
-    for index, line in enumerate(lines[1:], 1):
-        fields = line.split("|")
-        if start < len(fields) and not fields[start].strip() and not line.startswith("#"):
-            lines[index] = "|".join((*fields[:start], str(_OPEN), *fields[start + 1 :]))
-    return "\n".join(lines).encode()
+    for fields in rows:
+        if start < len(fields) and not fields[start].strip() and not fields[0].startswith("#"):
+            fields[start] = str(_OPEN)
+    return "\n".join([header, *map("|".join, rows)]).encode()
 
 
 def with_open_starts(inventory: Inventory) -> Inventory:

@@ -48,32 +48,37 @@ files write for unknown.
 """
 
 import re
-from collections.abc import Mapping
-from re import Match
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from obspy import Trace
+import numpy as np
+from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import COMPASS_AZIMUTHS, HORIZONTAL_LETTERS, SEED_CODE, VERTICAL_DIPS
+from per_obspy.constants import (
+    COMPASS_AZIMUTHS,
+    GAL,
+    HORIZONTAL_LETTERS,
+    SEED_CODE,
+    VERTICAL_DIPS,
+)
+from per_obspy.formats.text.lines import Text
+
+#: words of the vocabulary -> their values
+Words = dict[str, Any]
 
 #: words that can name a file
-_CODES = ("network", "station", "location", "channel")
+_CODES = {"network", "station", "location", "channel"}
 
 #: letters around the angle of a direction as ``N21E`` -> azimuth of the first, turn to the second
-_QUADRANT_AZIMUTHS = {
-    "NE": (0.0, 1.0),
-    "NW": (360.0, -1.0),
-    "SE": (180.0, -1.0),
-    "SW": (180.0, 1.0),
-}
+_QUADRANTS = {"NE": (0.0, 1.0), "NW": (360.0, -1.0), "SE": (180.0, -1.0), "SW": (180.0, 1.0)}
 _QUADRANT = re.compile(r"([NS])\s*+(\d{1,2}(?:\.\d*)?)\s*+([EW])")
 _DEGREES = re.compile(r"\d{1,3}(\.\d*)?")
 
 #: numbers of components; last letters of SEED codes of horizontals; azimuths and last letters of
 #: SEED codes in names of files
-_NUMBERS = ("1", "2", "3")
+_NUMBERS = tuple("123")
 _HORIZONTAL_CODES = tuple("NE12LTRHXY")
 _FILE_AZIMUTH = re.compile(r"000|0[1-9]\d|[12]\d\d|3[0-5]\d|360")
 _FILE_NUMBER = re.compile(r"(H|HOR|[A-Z][GHLMN])[12]")
@@ -88,7 +93,7 @@ _BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
 _AXIS_TOLERANCE = 5
 
 
-def orientation(words: str) -> dict[str, Any]:
+def orientation(words: str) -> Words:
     """
     Return ``sensor_azimuth``, ``sensor_dip``, ``direction`` of ``N21E``, ``NS``, ``UP``, ``LONG``.
 
@@ -112,7 +117,7 @@ def orientation(words: str) -> dict[str, Any]:
         return horizontal(COMPASS_AZIMUTHS[word])
     # An angle from north or south towards east or west
     if quadrant := _QUADRANT.fullmatch(word):
-        start, sign = _QUADRANT_AZIMUTHS[quadrant[1] + quadrant[3]]
+        start, sign = _QUADRANTS[quadrant[1] + quadrant[3]]
         return horizontal(start + sign * float(quadrant[2]))
     # A full azimuth in degrees
     if _DEGREES.fullmatch(word) and float(word) <= 360 and text not in _NUMBERS:
@@ -120,7 +125,7 @@ def orientation(words: str) -> dict[str, Any]:
     return _without_azimuth(re.sub(r"[^A-Z0-9]+", "", word))
 
 
-def _without_azimuth(word: str) -> dict[str, Any]:
+def _without_azimuth(word: str) -> Words:
     """Return the direction of a word that has no azimuth."""
     if not word:
         return {}
@@ -146,7 +151,7 @@ def _letter(word: str) -> str:
     return word[-1] if re.fullmatch(SEED_CODE, word) or word in _NUMBERS else ""
 
 
-def channel_direction(code: str) -> dict[str, Any]:
+def channel_direction(code: str) -> Words:
     """
     Return the direction of a channel code, of which N and E are azimuths as well.
 
@@ -158,7 +163,7 @@ def channel_direction(code: str) -> dict[str, Any]:
     return orientation(code)
 
 
-def file_direction(name: str) -> dict[str, Any]:
+def file_direction(name: str) -> Words:
     """
     Return the direction at the end of a file's name, for headers that have none.
 
@@ -207,28 +212,22 @@ def channel_code(sampling_rate: float, orientation: Mapping[str, Any]) -> str:
         return f"{band}NZ"
     if "sensor_azimuth" not in orientation:
         return f"{band}N{_letter(orientation.get('direction', ''))}"
-    return f"{band}N{_horizontal_letter(orientation['sensor_azimuth'])}"
-
-
-def _horizontal_letter(azimuth: float) -> str:
-    """Return the last letter of a horizontal channel's code: N, E, 1 or 2."""
+    azimuth = orientation["sensor_azimuth"]
     for letter, axis in (("N", 0.0), ("E", 90.0)):
         # Angle between sensor and axis, from 0 to 180 degrees
-        angle = abs((azimuth - axis + 180) % 360 - 180)
-        if angle <= _AXIS_TOLERANCE:
-            return letter
+        if abs((azimuth - axis + 180) % 360 - 180) <= _AXIS_TOLERANCE:
+            return f"{band}N{letter}"
     # From 135 to 45 degrees through north; the tolerance keeps both ends from one letter
-    from_southeast = (azimuth + 45 - 1e-7) % 180
-    return "1" if from_southeast < 90 else "2"
+    return f"{band}N{1 if (azimuth + 45 - 1e-7) % 180 < 90 else 2}"
 
 
 def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = "") -> Trace:
     """
-    Return a trace with the words of the vocabulary.
+    Return a trace with the words of the vocabulary, which is acceleration in m/s2 by default.
 
     Words that are None are left out, and so are empty groups. The channel code is made from rate
     and orientation where the header has none. Codes keep letters, digits, ``_`` and ``-`` only, so
-    that they can name a file.
+    that they can name a file. The peak of the header loses its sign.
 
     Parameters
     ----------
@@ -237,49 +236,73 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = 
     dt : float
         Sampling interval, s.
     words : mapping
-        From the header.
+        From the header; ``notes`` and the ``problem`` of the coordinates become lines of
+        ``processing``.
     file : str, optional
         Name of a file of one component, whose end may be a direction.
     """
-    known = {}
-    words = _with_notes(words)
-    for name, word in words.items():
-        group = _without_unknowns(word)
-        if group is not None and group != AttribDict():
-            known[name] = group
+    header: Words = {"units": "m/s2", "quantity": "acceleration", **words}
+    # Notes of the reader and of the place
+    place = dict(header.get("coordinates") or {})
+    notes = [*header.pop("notes", ()), place.pop("problem", None)]
+    header["coordinates"] = place
+    header["processing"] = [f"per_obspy: {note}" for note in notes if note] or None
+    header = _without_unknowns(header)
+    if "header_peak" in header:
+        header["header_peak"] = abs(header["header_peak"])
     # The name of the file helps where the header names no direction
-    if "sensor_dip" not in known and "channel" not in known:
-        known |= file_direction(file)
-    known.setdefault("channel", channel_code(1 / dt, known))
+    if "sensor_dip" not in header and "channel" not in header:
+        header |= file_direction(file)
+    header.setdefault("channel", channel_code(1 / dt, header))
     # Strip the characters that a file name cannot hold
-    for name in _CODES:
-        if name in known:
-            known[name] = re.sub(r"[^A-Za-z0-9_-]", "", known[name])
-    return Trace(data=samples, header={"delta": dt, **known})
+    for name in _CODES & header.keys():
+        header[name] = re.sub(r"[^A-Za-z0-9_-]", "", header[name])
+    return Trace(data=np.ascontiguousarray(samples), header={"delta": dt, **header})
 
 
-def _with_notes(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Return words whose notes and problem of the place are lines of ``processing``."""
-    # The problem of a place travels with its coordinates
-    place = dict(words.get("coordinates") or {})
-    notes = [*words.get("notes", ()), place.pop("problem", None)]
-    lines = [f"per_obspy: {note}" for note in notes if note]
-    changed = {name: word for name, word in words.items() if name != "notes"}
-    if "coordinates" in words:
-        changed["coordinates"] = place
-    return changed | {"processing": lines} if lines else changed
+def _without_unknowns(words: Mapping[str, Any]) -> Words:
+    """Return words that are not None; groups become attributes, empty ones are left out."""
+    known: Words = {}
+    for name, word in words.items():
+        if isinstance(word, Mapping):
+            group = AttribDict(_without_unknowns(word))
+            known |= {name: group} if group else {}
+        elif word is not None:
+            known[name] = word
+    return known
 
 
-def _without_unknowns(word: Any) -> Any:
-    """Return a group of words without those that are None; any other word as it is."""
-    if not isinstance(word, Mapping):
-        return word
-    return AttribDict({name: part for name, part in word.items() if part is not None})
+def gal_columns(
+    table: FloatArray, dt: float, words: Mapping[str, Any], components: Iterable[Mapping[str, Any]]
+) -> Stream:
+    """
+    Return the components of a table as traces.
+
+    Parameters
+    ----------
+    table : (n_samples, n_components) ndarray
+        gal.
+    dt : float
+        Sampling interval, s.
+    words, components : mapping, iterable of mapping
+        Words of all components, and of each.
+    """
+    columns = zip(GAL * table.T, components, strict=True)
+    return Stream([trace(column, dt, {**words, **component}) for column, component in columns])
+
+
+def read_components(text: Text, read_component: Callable[[Text, int], tuple[Trace, int]]) -> Stream:
+    """Read components that follow each other; each is a trace and the line after it."""
+    stream, line = Stream(), 0
+    while line < len(text.lines):
+        component, line = read_component(text, line)
+        stream.append(component)
+    return stream
 
 
 def coordinates(
     latitude: float | None, longitude: float | None, elevation: float | None = None
-) -> dict[str, Any]:
+) -> Words:
     """
     Return the group of coordinates, degrees and m.
 
@@ -292,29 +315,3 @@ def coordinates(
         place = f"latitude {latitude:g}, longitude {longitude:g}"
         return {"problem": f"{place}: out of range, so the place is unknown"}
     return {"latitude": latitude, "longitude": longitude, "elevation": elevation}
-
-
-def corners(found: Match[str] | None, first: int = 1) -> dict[str, float]:
-    """
-    Return the corners of a filter from two groups of a match, Hz; empty where there is none.
-
-    >>> corners(re.match(r"([.0-9]+)-([.0-9]+)", "0.1-30"))
-    {'highpass': 0.1, 'lowpass': 30.0}
-    """
-    if found is None:
-        return {}
-    return {"highpass": float(found[first]), "lowpass": float(found[first + 1])}
-
-
-def sensor_constants(found: Match[str] | None) -> dict[str, float | None]:
-    """
-    Return natural frequency, Hz, and damping from a match of period, s, and damping.
-
-    >>> sensor_constants(re.match(r"(.*) s (.*)", "0.05 s 0.6"))
-    {'natural_frequency': 20.0, 'damping': 0.6}
-    """
-    period = float(found[1]) if found else 0.0
-    return {
-        "natural_frequency": 1 / period if period > 0 else None,
-        "damping": float(found[2]) if found else None,
-    }

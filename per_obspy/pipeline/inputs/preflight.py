@@ -9,10 +9,10 @@ from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.reading import checked_file
-from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.pipeline.inputs.drawn_pairs import pair_table
 from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
+from per_obspy.simulation.buildings import simulated_pairs
 
 
 def check_inputs(settings: Run, folder: Path) -> None:

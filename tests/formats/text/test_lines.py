@@ -1,9 +1,4 @@
-"""
-Lines, number fields and blocks of text files.
-
-Covers ``per_obspy.formats.text.lines`` and the blocks built on it in
-``per_obspy.formats.text.number_blocks``.
-"""
+"""Lines, number fields and blocks of text files."""
 
 import io
 import re
@@ -13,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from sample_file import MOTION, block
+from sample_file import block
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.text.lines import (
@@ -28,9 +23,9 @@ from per_obspy.formats.text.lines import (
     head,
     interval,
     line_at,
+    match_line,
     read_text,
 )
-from per_obspy.formats.text.number_blocks import is_title, titled_block
 
 THOUSANDTHS = st.integers(-99_999, 999_999)
 
@@ -52,7 +47,7 @@ def test_blocks_in_columns_are_read_as_written(thousandths: list[int], per_line:
 def test_free_blocks_do_not_depend_on_their_lines(thousandths: list[int], per_line: int):
     values = np.array(thousandths) / 1000
     text = text_of(block(values, " %.3f", per_line))
-    assert_array_equal(free_block(text, 0, None, len(values)), values)
+    assert_array_equal(free_block(text, 0, len(values)), values)
 
 
 @pytest.mark.parametrize(
@@ -76,9 +71,9 @@ def test_faults_of_a_block_are_named(content: str, samples: int, message: str):
 
 def test_a_free_block_must_hold_what_is_promised():
     with pytest.raises(RecordRejected, match="line 2, samples: the header promises 4, the file"):
-        free_block(text_of("1 2\n3"), 0, None, 4)
+        free_block(text_of("1 2\n3"), 0, 4)
     with pytest.raises(RecordRejected, match="line 1, samples: none"):
-        free_block(text_of(""), 0, None, 4)
+        free_block(text_of(""), 0, 4)
 
 
 @pytest.mark.parametrize("word", ["0", "-3", "2.5", "nan", "1_000", "", "1e400"])
@@ -110,14 +105,11 @@ def test_any_line_end_and_any_byte_can_be_read():
     assert head("no such file", 2) == b""
 
 
-@pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
-def test_a_title_announces_interval_or_rate(spacing: str):
-    title = f" {len(MOTION)} points of accel data {spacing}, in cm/sec2. (8f10.6)"
-    text = text_of(f"{title}\n{block(MOTION, '%10.6f', 8)}\nnext")
-    assert is_title(title)
-    values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
-    assert_array_equal(values, MOTION)
-    assert (dt, text.lines[line]) == (0.01, "next")
+def test_a_line_that_fits_no_pattern_is_quoted():
+    text = text_of("a = 5\n  b")
+    assert match_line(text, 0, "a", re.compile(r"a = (\d)"))[1] == "5"
+    with pytest.raises(RecordRejected, match="line 2, a: 'b' gives none"):
+        match_line(text, 1, "a", re.compile("a"))
 
 
 LONG = "1" * (LONGEST_NUMBER + 1)
@@ -132,7 +124,7 @@ def test_a_line_too_long_for_any_format_is_refused_before_it_is_searched():
 def test_a_word_too_long_for_a_number_is_refused():
     message = f"{len(LONG)} characters, a number has at most {LONGEST_NUMBER}"
     with pytest.raises(RecordRejected, match=f"line 2, samples: {message}"):
-        free_block(text_of(f"1 2\n{LONG}"), 0, None, 3)
+        free_block(text_of(f"1 2\n{LONG}"), 0, 3)
     with pytest.raises(RecordRejected, match=f"line 1, points: {message}"):
         count(text_of(""), 0, "points", LONG)
     # Blanks around a number do not count
@@ -148,7 +140,7 @@ def test_a_format_of_columns_too_wide_is_refused(width: int, per_line: int):
 
 def test_a_message_does_not_repeat_a_whole_damaged_file():
     with pytest.raises(RecordRejected) as caught:
-        free_block(text_of("y" * 9999), 0, None, 1)
+        free_block(text_of("y" * 9999), 0, 1)
     assert len(str(caught.value)) < 400  # the longest problem has 300 characters
 
 

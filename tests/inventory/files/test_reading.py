@@ -15,7 +15,7 @@ from per_obspy.inventory.files import text_lines
 from per_obspy.inventory.files.raw_rows import name_hashes
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.inventory.files.writing import write_pairs
-from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.simulation.buildings import simulated_pairs
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note"
 GOOD = "007,0.05,-67.95,-20.35,12,-67.9501,-20.35,9.5,corner shop"

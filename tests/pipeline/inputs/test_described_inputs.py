@@ -15,7 +15,7 @@ from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.inputs.described_inputs import described
 from per_obspy.pipeline.inputs.described_tables import MOST_ROWS
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap,ward\n"
 ROWS = "a,0.3,0.1,10,0.3002,0.1,12,0.05,N\nb,0.4,0.1,10,0.4002,0.1,30,0,N\nc,0,0,10,0,0,30,-1,S\n"

@@ -7,7 +7,7 @@ import pytest
 from per_obspy.config import Run, Scenario, load
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.inputs.discovery import found_inputs, write_first_configuration
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
 

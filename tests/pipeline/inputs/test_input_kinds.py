@@ -12,7 +12,7 @@ import pytest
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.inputs.input_kinds import Kind, files_in, kind_of, records_place
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
 

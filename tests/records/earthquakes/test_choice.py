@@ -15,8 +15,8 @@ from per_obspy.errors import CatalogError
 from per_obspy.records.earthquakes.choice import largest_motion, one_earthquake, peak_motion
 from per_obspy.records.earthquakes.groups import event_groups
 from per_obspy.records.folder import find_stations, read_station
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import Sources, find_sources
+from per_obspy.simulation.earthquake import simulate, write_simulation
 
 MAIN, AFTER = "2019-07-06T03:19:53", "2019-07-06T04:30:00"
 

@@ -34,7 +34,7 @@ from per_obspy.files import file_hash
 from per_obspy.records.fdsn import providers
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.folder import read_station
-from per_obspy.records.simulation.earthquake import Simulation, simulate
+from per_obspy.simulation.earthquake import Simulation, simulate
 
 STATIONS = ["XX.S001", "XX.S002", "XX.S003", "XX.S004"]
 Ask = Callable[..., Fetched]

@@ -9,7 +9,7 @@ from per_obspy.errors import ServiceError
 from per_obspy.files import file_hash
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
 from per_obspy.records.fdsn.cut_records import cut_records_aside
-from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.simulation.earthquake import simulate
 
 ORIGIN = UTCDateTime(2000, 1, 1)
 

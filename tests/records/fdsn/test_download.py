@@ -26,8 +26,8 @@ from per_obspy.records.fdsn.download import Offer, fetch_station
 from per_obspy.records.fdsn.request import Wanted, wanted_around
 from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.seedlink.server_address import server_address
-from per_obspy.records.simulation.earthquake import Simulation, simulate
 from per_obspy.resume import read_status
+from per_obspy.simulation.earthquake import Simulation, simulate
 
 YEAR = 365 * 86400.0
 

@@ -15,7 +15,7 @@ from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.event_file import EventRow, read_event
 from per_obspy.records.fdsn.event_list import fetched_event, find_events
 from per_obspy.records.fdsn.web import web_pool
-from per_obspy.records.simulation.earthquake import Simulation, simulate
+from per_obspy.simulation.earthquake import Simulation, simulate
 
 
 @pytest.fixture(scope="module")

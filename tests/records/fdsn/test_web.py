@@ -11,7 +11,7 @@ from fdsn_server import FdsnServer, content, cut, endless, serving, status
 from per_obspy.config import Scenario
 from per_obspy.errors import ServiceError
 from per_obspy.records.fdsn.web import NotFound, RequestTooLarge, WebPool, answer, web_pool
-from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.simulation.earthquake import simulate
 
 LIST = {"format": "text", "level": "station"}
 

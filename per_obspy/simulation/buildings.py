@@ -95,7 +95,14 @@ def simulated_pairs(
     >>> list(table["pair_id"])
     ['P0000001', 'P0000002', 'P0000003']
     """
-    stations = _checked_stations(longitudes, latitudes)
+    east = checks.between("longitudes", longitudes, -180, 180)
+    north = checks.between("latitudes", latitudes, -85, 85)
+    if east.ndim != 1 or east.size == 0 or east.shape != north.shape:
+        raise ValueError(
+            "longitudes and latitudes must be rows of equal length, "
+            f"got {east.shape} and {north.shape}"
+        )
+    # Arguments of the town
     if count < 1:
         raise ValueError(f"count must be at least 1, got {count}")
     checks.positive("radius", radius)
@@ -105,66 +112,45 @@ def simulated_pairs(
     rows = _rows(seed, count)
     columns = _buildings(generator, rows)
     columns["gap"] = _gaps(generator, count, touching)
-    columns |= _places(generator, columns, rows, stations, radius)
+    columns |= _places(generator, columns, rows, np.column_stack([east, north]), radius)
     columns |= _names(rows)
-    columns["pair_id"] = np.array([f"P{number:07d}" for number in range(1, count + 1)])
     return pd.DataFrame({name: columns[name] for name in COLUMNS if name in columns})
 
 
 class _Rows(NamedTuple):
-    """
-    Pairs as rows of buildings, one after the other.
+    """Pairs as rows of buildings, one after the other; (count,) each."""
 
-    Attributes
-    ----------
-    goes_on, turns : (count,) ndarray of bool
-        Whether building 1 of a pair is building 2 of the pair before, and whether around a corner.
-    place : (count,) ndarray of int
-        Place of each pair in its row, from 0.
-    start : (count,) ndarray of int
-        The first pair of its row.
-    """
-
-    goes_on: NDArray[np.bool_]
-    turns: NDArray[np.bool_]
-    place: NDArray[np.int64]
-    start: NDArray[np.int64]
+    goes_on: NDArray[np.bool_]  # building 1 of the pair is building 2 of the pair before
+    turns: NDArray[np.bool_]  # and that around a corner
+    start: NDArray[np.int64]  # first pair of its row
 
 
 def _rows(seed: int, count: int) -> _Rows:
     """Return which pairs go on from the one before."""
     # Separate random numbers, so that those of buildings and places do not change
-    drawn = np.random.default_rng([seed, 1]).random(count)
-    goes_on = drawn < STRAIGHT + CORNER
+    chance = np.random.default_rng([seed, 1]).random(count)
+    goes_on = chance < STRAIGHT + CORNER
     goes_on[0] = False
-    number = np.arange(count)
-    start = np.maximum.accumulate(np.where(goes_on, 0, number))
-    return _Rows(goes_on, goes_on & (drawn >= STRAIGHT), number - start, start)
+    start = np.maximum.accumulate(np.where(goes_on, 0, np.arange(count)))
+    return _Rows(goes_on, goes_on & (chance >= STRAIGHT), start)
 
 
 def _names(rows: _Rows) -> Columns:
-    """Return identifiers of the buildings, and whether a pair is at the end of its row."""
+    """Return identifiers of pairs and buildings, and whether a pair is at the end of its row."""
     # Each pair has a new building 2, and the first pair of each row a new building 1
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
     straight = rows.goes_on & ~rows.turns
     inside = straight & np.append(straight[1:], False)
     return {
-        "building_id_1": np.array([f"B{number:07d}" for number in (last - 1).tolist()]),
-        "building_id_2": np.array([f"B{number:07d}" for number in last.tolist()]),
+        "pair_id": _identifiers("P", np.arange(1, last.size + 1)),
+        "building_id_1": _identifiers("B", last - 1),
+        "building_id_2": _identifiers("B", last),
         "position": np.where(inside, POSITIONS[1], POSITIONS[0]),
     }
 
 
-def _checked_stations(longitudes: ArrayLike, latitudes: ArrayLike) -> FloatArray:
-    """Return positions in degrees, one row per station: longitude and latitude."""
-    east = checks.between("longitudes", longitudes, -180, 180)
-    north = checks.between("latitudes", latitudes, -85, 85)
-    if east.ndim != 1 or east.size == 0 or east.shape != north.shape:
-        raise ValueError(
-            "longitudes and latitudes must be rows of equal length, "
-            f"got {east.shape} and {north.shape}"
-        )
-    return np.column_stack([east, north])
+def _identifiers(letter: str, numbers: NDArray[np.int64]) -> NDArray[np.str_]:
+    return np.array([f"{letter}{number:07d}" for number in numbers.tolist()])
 
 
 def _lognormal(
@@ -175,17 +161,17 @@ def _lognormal(
     return values
 
 
-def _buildings(generator: np.random.Generator, pairs: _Rows) -> Columns:
+def _buildings(generator: np.random.Generator, rows: _Rows) -> Columns:
     """Return sizes, systems, measured periods and dampings of both buildings of each pair."""
-    count = pairs.place.size
-    storeys, height, system = _sizes(generator, pairs)
+    count = rows.start.size
+    storeys, height, system = _sizes(generator, rows)
     area = np.round(_lognormal(generator, count, *AREA))
     # Measured values, NaN where the building was not measured
     is_measured = generator.random((2, count)) < MEASURED
     scatter = _lognormal(generator, count, 1.0, PERIOD_SCATTER)
     period = np.round(asce7_period(height, system) * scatter, 3)
     damping = np.round(generator.uniform(*DAMPINGS, (2, count)), 3)
-    rows = {
+    buildings = {
         "storeys": storeys,
         "height": height,
         "system": system,
@@ -194,39 +180,33 @@ def _buildings(generator: np.random.Generator, pairs: _Rows) -> Columns:
         "damping": np.where(is_measured, damping, np.nan),
     }
     # Building 1 of a pair that goes on is building 2 of the one before
-    on = np.flatnonzero(pairs.goes_on)
-    for values in rows.values():
+    on = np.flatnonzero(rows.goes_on)
+    for values in buildings.values():
         values[0, on] = values[1, on - 1]
-    return {f"{name}_{i}": values[i - 1] for name, values in rows.items() for i in (1, 2)}
+    return {f"{name}_{i}": values[i - 1] for name, values in buildings.items() for i in (1, 2)}
 
 
-def _sizes(generator: np.random.Generator, pairs: _Rows) -> tuple[FloatArray, FloatArray, Any]:
+def _sizes(generator: np.random.Generator, rows: _Rows) -> tuple[FloatArray, FloatArray, Any]:
     """
     Return storeys, heights in m and systems, (2, count) each.
 
     Building 2 often repeats the size or the system of building 1.
     """
-    count = pairs.place.size
+    count = rows.start.size
     storeys = np.clip(np.rint(_lognormal(generator, count, *STOREYS)), 1, MOST_STOREYS)
-    drawn = np.round(generator.normal(*STOREY_HEIGHT, (2, count)), 1)
-    storey_height = np.clip(drawn, *STOREY_HEIGHTS)
+    storey_height = np.round(generator.normal(*STOREY_HEIGHT, (2, count)), 1)
+    storey_height = storey_height.clip(*STOREY_HEIGHTS)
     system = generator.choice(SYSTEMS, (2, count), p=SYSTEM_SHARES)
     # Neighbours of equal height have equal storeys
     is_equal = generator.random(count) < EQUAL
     has_same_system = generator.random(count) < SAME_SYSTEM
-    # From the first pair of each row to its last, each begins with the building before
-    for place in range(int(pairs.place.max()) + 1):
-        here = np.flatnonzero(pairs.place == place)
-        for values, alike in (
-            (storeys, is_equal),
-            (storey_height, is_equal),
-            (system, has_same_system),
-        ):
-            if place:
-                values[0, here] = values[1, here - 1]
-            same = here[alike[here]]
-            values[1, same] = values[0, same]
-    return storeys, np.round(storeys * storey_height, 1), system
+    alike = ((storeys, is_equal), (storey_height, is_equal), (system, has_same_system))
+    # The last pair of the row that chose, whose building the following repeat
+    for values, is_alike in alike:
+        chosen = np.where(rows.goes_on & is_alike, 0, np.arange(count))
+        origin = np.maximum.accumulate(chosen)
+        values[1] = np.where(is_alike[origin], values[0, origin], values[1, origin])
+    return storeys, (storeys * storey_height).round(1), system
 
 
 def _gaps(generator: np.random.Generator, count: int, touching: float) -> FloatArray:
@@ -243,7 +223,7 @@ def _places(
     radius: float,
 ) -> Columns:
     """Return positions and azimuths in degrees; each station's neighbourhood has a street grid."""
-    count = rows.place.size
+    count = rows.start.size
     # Pairs of a row are around one station
     station = generator.integers(len(stations), size=count)[rows.start]
     azimuth = _azimuths(generator, station, len(stations), rows)
@@ -251,20 +231,24 @@ def _places(
     bearing = np.deg2rad(generator.uniform(0.0, 360.0, count))
     distance = radius * np.sqrt(generator.random(count))
     first = (distance * _direction(bearing))[:, rows.start]
-    offsets = _offsets(first, _steps(columns, azimuth), rows, radius)
-    places = {}
-    for i, offset in enumerate(offsets, start=1):
-        longitude, latitude = _moved(stations[station, 0], stations[station, 1], *offset)
-        places[f"longitude_{i}"] = np.round(longitude, 7)
-        places[f"latitude_{i}"] = np.round(latitude, 7)
-    return {**places, "azimuth": azimuth}
-
-
-def _steps(columns: Columns, azimuth: FloatArray) -> FloatArray:
-    """Return from building 1 to 2 along the axis, (2, count), m; buildings are square."""
+    # From building 1 to 2 along the axis; buildings are square
     half_sides = (np.sqrt(columns["area_1"]) + np.sqrt(columns["area_2"])) / 2.0
-    separation = half_sides + columns["gap"]
-    return np.asarray(separation * _direction(np.deg2rad(azimuth)))
+    steps = (half_sides + columns["gap"]) * _direction(np.deg2rad(azimuth))
+    places = {"azimuth": azimuth}
+    for i, offset in enumerate(_offsets(first, steps, rows, radius), start=1):
+        longitude, latitude = _move(*stations[station].T, *offset)
+        places |= {f"longitude_{i}": longitude, f"latitude_{i}": latitude}
+    return places
+
+
+def _move(
+    longitude: FloatArray, latitude: FloatArray, east: FloatArray, north: FloatArray
+) -> FloatArray:
+    """Return places a few kilometres (m) to the east and north, degrees, Earth as flat."""
+    northward = latitude + north / METRES_PER_DEGREE
+    eastward = longitude + east / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
+    # Longitudes between -180 and 180 degrees
+    return np.round([(eastward + 180.0) % 360.0 - 180.0, northward], 7)
 
 
 def _direction(azimuth: FloatArray) -> FloatArray:
@@ -305,13 +289,3 @@ def _azimuths(
     side += 90.0 * (turns - turns[rows.start])
     azimuth = np.round(street + side + generator.normal(0.0, STREET_SCATTER, station.size))
     return azimuth % 360.0
-
-
-def _moved(
-    longitude: FloatArray, latitude: FloatArray, east: FloatArray, north: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return positions moved by a few kilometres (m) to the east and north, Earth as flat."""
-    northward = latitude + north / METRES_PER_DEGREE
-    eastward = longitude + east / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
-    # Longitudes between -180 and 180 degrees
-    return (eastward + 180.0) % 360.0 - 180.0, northward

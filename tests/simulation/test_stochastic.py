@@ -1,10 +1,10 @@
-"""The stochastic method's parts, each against its closed form."""
+"""The stochastic method's parts against their closed forms; the field with its correlation."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.records.simulation import stochastic
+from per_obspy.simulation import stochastic
 
 FREQUENCY = np.geomspace(0.01, 50.0, 40)
 
@@ -48,12 +48,14 @@ def test_two_corners_give_less_long_period_motion_than_one():
 
 
 def test_spreading_is_continuous_and_turns():
+    def spreading(distance: float) -> float:
+        # no attenuation
+        return stochastic.path_spectrum(np.array([1.0]), distance, 3500.0, np.inf, 0.0)[0]
+
     crossover = stochastic.CROSSOVER
-    assert_allclose(
-        stochastic.spreading(crossover * (1 - 1e-12)), stochastic.spreading(crossover), rtol=1e-11
-    )
-    assert_allclose(stochastic.spreading(1e4) / stochastic.spreading(2e4), 2.0, rtol=1e-12)
-    assert_allclose(stochastic.spreading(1e5) / stochastic.spreading(4e5), 2.0, rtol=1e-12)
+    assert_allclose(spreading(crossover * (1 - 1e-12)), spreading(crossover), rtol=1e-11)
+    assert_allclose(spreading(1e4) / spreading(2e4), 2.0, rtol=1e-12)
+    assert_allclose(spreading(1e5) / spreading(4e5), 2.0, rtol=1e-12)
 
 
 def test_attenuation_of_constant_quality():
@@ -120,3 +122,66 @@ def test_large_faults_are_never_near():
     # Atkinson & Silva (2000): h = 10**(-0.05 + 0.15 M) km, 10 km for M 7
     assert_allclose(stochastic.effective_distance(0.0, 7.0), 1e4, rtol=1e-12)
     assert_allclose(stochastic.effective_distance(1e6, 7.0), 1e6, rtol=2e-4)
+
+
+REACH = 20_000.0
+FIELD_FREQUENCIES = np.array([0.2, 1.0, 1.0 * np.exp(stochastic.FREQUENCY_LENGTH), 20.0])
+
+#: Fields of a test.
+FIELDS = 500
+
+#: Standard error of a standard deviation, and of a correlation near 0, from so many fields is
+#: 0.032 and 0.045: four times the larger.
+TOLERANCE = 0.18
+
+
+def fields(east: float, north: float = 0.0) -> np.ndarray:
+    values = [
+        stochastic.log_variation(
+            np.random.default_rng(seed), (east, north), REACH, FIELD_FREQUENCIES
+        )
+        for seed in range(FIELDS)
+    ]
+    return np.array(values)
+
+
+def test_mean_and_deviation_are_those_of_a_standard_normal_variable():
+    values = fields(3e6)  # far from the origin of the field, which is no special place
+    assert_allclose(values.mean(axis=0), 0.0, atol=TOLERANCE)
+    assert_allclose(values.std(axis=0), 1.0, atol=TOLERANCE)
+    # a share of 0.954 lies within two deviations; standard error 0.009 for each frequency
+    assert_allclose((np.abs(values) < 2.0).mean(axis=0), 0.954, atol=0.04)
+
+
+def test_correlation_decays_with_distance_in_every_direction():
+    origin = fields(0.0)
+    for east, north in ((5e3, 0.0), (0.0, 5e3), (-3e3, 4e3)):
+        products = (origin * fields(east, north)).mean(axis=0)
+        assert_allclose(products, np.exp(-3.0 * 5e3 / REACH), atol=TOLERANCE)
+    # exp(-15) at five times the reach
+    assert_allclose((origin * fields(1e5)).mean(axis=0), 0.0, atol=TOLERANCE)
+
+
+def test_correlation_decays_with_the_ratio_of_frequencies():
+    values = fields(0.0)
+    expected = np.exp(
+        -np.abs(np.subtract.outer(*[np.log(FIELD_FREQUENCIES)] * 2)) / stochastic.FREQUENCY_LENGTH
+    )
+    assert_allclose(values.T @ values / FIELDS, expected, atol=TOLERANCE)
+
+
+def test_a_place_knows_its_own_value_only_by_its_coordinates():
+    alone = stochastic.log_variation(
+        np.random.default_rng(7), (10.0, 20.0), REACH, FIELD_FREQUENCIES[:2]
+    )
+    among = stochastic.log_variation(
+        np.random.default_rng(7), (10.0, 20.0), REACH, FIELD_FREQUENCIES
+    )
+    assert_allclose(alone, among[:2], rtol=1e-15)
+
+
+def test_the_field_is_constant_beyond_its_frequencies():
+    low = stochastic.log_variation(
+        np.random.default_rng(7), (0.0, 0.0), REACH, np.array([0.0, 1e-3, 1e-2])
+    )
+    assert_allclose(low, low[-1], rtol=1e-15)

@@ -1,18 +1,17 @@
-"""Digitised film on even steps."""
+"""Titled blocks of samples, and digitised film on even steps."""
 
 import io
 
 import numpy as np
 import pytest
 from format_samples import SAMPLES
-from number_samples import smc_numbers
 from numpy.testing import assert_allclose, assert_array_equal
 from sample_file import MOTION, block, film
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.smc import read_smc
-from per_obspy.formats.text.film import even_film, film_lines, read_film
 from per_obspy.formats.text.lines import Text
+from per_obspy.formats.text.volumes import even_film, is_title, read_film, titled_block
 
 
 def text_of(content: str) -> Text:
@@ -23,10 +22,20 @@ def even(times: np.ndarray, values: np.ndarray):
     return even_film(text_of(""), 0, np.column_stack((times, values)), 5)
 
 
+@pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
+def test_a_title_announces_interval_or_rate(spacing: str):
+    title = f" {len(MOTION)} points of accel data {spacing}, in cm/sec2. (8f10.6)"
+    text = text_of(f"{title}\n{block(MOTION, '%10.6f', 8)}\nnext")
+    assert is_title(title)
+    values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
+    assert_array_equal(values, MOTION)
+    assert (dt, text.lines[line]) == (0.01, "next")
+
+
 def test_even_film_gives_its_values_and_their_mean_interval():
     text = text_of(film(MOTION, 0.02))
     result = read_film(text, 0, len(MOTION))
-    assert film_lines(len(MOTION)) == len(text.lines)
+    assert result.next_line == len(text.lines)
     # times and values are written to three decimals
     assert_allclose(result.values, np.round(MOTION, 3), rtol=1e-15)
     assert result.dt == pytest.approx(0.02, rel=1e-12)
@@ -84,19 +93,49 @@ def test_a_hole_in_the_film_is_refused():
         even(times, np.sin(times))
 
 
-@pytest.mark.parametrize("counts_numbers", [False, True])
-def test_smc_film_is_pairs_of_time_and_value(counts_numbers: bool):
-    motion = np.tile(MOTION, 4)
-    times = 0.02 * np.arange(len(motion))
-    pairs = np.column_stack((times, motion)).ravel()
-    # Header of a corrected record without its sampling rate
-    head = SAMPLES["smc"].text.replace("2 CORRECTED", "1 UNCORRECTED").split("\n")[:11]
-    numbers = smc_numbers(len(pairs) if counts_numbers else len(motion))
-    numbers = numbers.replace("  2.0000000E+02", "  1.7000000E+38")
-    content = "\n".join([*head, numbers, "|comment", block(pairs, "%10.3f", 8)])
-    (trace,) = read_smc(io.BytesIO(content.encode()))
-    # cm/s2 of three decimals
-    assert_allclose(trace.data, 0.01 * np.round(motion, 3), rtol=1e-14)
-    assert trace.stats.delta == pytest.approx(0.02, rel=1e-12)
+#: 40 pairs of time, s, and value, cm/s2
+TIMES = 0.005 * np.arange(40)
+VALUES = np.round(50.0 * np.sin(TIMES * 31.0), 2)
+
+
+def smc_film(count: int, values=VALUES, more: str = "") -> str:
+    """Return a film of the pairs whose header promises so many, of pairs or numbers."""
+    sample = SAMPLES["smc"]
+    head = sample.text[: sample.text.index("|comment")]
+    head = head.replace("2 CORRECTED", "1 UNCORRECTED").replace(
+        "  2.0000000E+02", "  1.7000000E+38"
+    )
+    head = head.replace(f"{len(sample.values[0]):10d}", f"{count:10d}", 1)
+    # Exponents of one digit, as the format has them
+    words = [
+        f"{number:11.4E}" for number in np.column_stack((TIMES[: len(values)], values)).ravel()
+    ]
+    short = "".join(word[:9] + word[-1] for word in words)
+    rows = [short[first : first + 80] for first in range(0, len(short), 80)]
+    return "\n".join([head + "|comment", *rows]) + "\n" + more
+
+
+@pytest.mark.parametrize("count", [40, 80])
+@pytest.mark.parametrize("more", ["", " 3.5881E+1 1.4315E+0 3.5882E+1 1.5234E+0\n"])
+def test_pairs_are_read_whether_the_header_counts_pairs_or_numbers(count: int, more: str):
+    trace = read_smc(io.BytesIO(smc_film(count, more=more).encode()))[0]
     assert (trace.stats.processing_level, trace.stats.digitised) == ("raw", True)
-    assert trace.stats.processing[0].startswith("per_obspy: digitised film, times up to")
+    # five digits of the file
+    assert_allclose(trace.data, 0.01 * VALUES, atol=5e-5)
+    assert_allclose(trace.stats.delta, 0.005, rtol=1e-6)
+    steps = " ".join(trace.stats.processing)
+    assert ("a line after the last pair is left out" in steps) == bool(more)
+
+
+@pytest.mark.parametrize("count", [40, 80])
+def test_two_lines_more_are_refused(count: int):
+    more = " 3.5881E+1 1.4315E+0\n 3.5882E+1 1.5234E+0\n"
+    with pytest.raises(RecordRejected, match="line"):
+        read_smc(io.BytesIO(smc_film(count, more=more).encode()))
+
+
+@pytest.mark.parametrize("pairs", [20, 30, 36])
+def test_a_cut_film_is_refused(pairs: int):
+    # the header counts all numbers
+    with pytest.raises(RecordRejected, match="the header promises"):
+        read_smc(io.BytesIO(smc_film(80, VALUES[:pairs]).encode()))

@@ -7,7 +7,7 @@ from obspy.geodetics import gps2dist_azimuth
 
 from per_obspy import asce7_period, read_pairs
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.simulation.buildings import simulated_pairs
 
 STATIONS = [-67.95, -67.80], [-20.35, -20.25]
 RADIUS, TOUCHING = 2000.0, 0.5

@@ -1,1 +1,0 @@
-"""Simulate the records of an earthquake by a stochastic point source."""

@@ -1,0 +1,1 @@
+"""Made-up earthquakes with their records and stations, and made-up buildings around them."""
