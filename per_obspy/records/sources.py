@@ -15,8 +15,8 @@ from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
+from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.contents.input_files import hash_if_readable
 from per_obspy.records.earthquakes.choice import (
     OneEarthquake,
     Reader,

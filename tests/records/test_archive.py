@@ -9,7 +9,7 @@ import pytest
 from archive_samples import AT2, mseed
 
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.records.archives.archive_files import archive_files, open_file
+from per_obspy.records.archive import archive_files, open_file
 from per_obspy.records.folder import find_stations, read_station
 
 CONTENT = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from obspy import Stream, Trace, UTCDateTime
 
-from per_obspy.records.contents.one_series import without_doubles
+from per_obspy.records.folder import one_series
 
 START = UTCDateTime(2020, 1, 2, 3, 4, 5)
 
@@ -18,7 +18,7 @@ def form(
 
 
 def kept(*traces: Trace) -> list[str]:
-    stream, rejected = without_doubles(Stream(list(traces)))
+    stream, rejected = one_series(Stream(list(traces)))
     assert len(stream) + len(rejected) == len(traces)
     return [trace.stats.source for trace in stream]
 
@@ -26,7 +26,7 @@ def kept(*traces: Trace) -> list[str]:
 def test_acceleration_goes_before_counts():
     counts, physical = form("a.V0", "counts"), form("a.V1")
     assert kept(counts, physical) == kept(physical, counts) == ["a.V1"]
-    _, (row,) = without_doubles(Stream([counts, physical]))
+    _, (row,) = one_series(Stream([counts, physical]))
     assert (row.kind, row.name, row.source) == ("record", "CE.1..HNN", "a.V0")
     assert row.reasons == ("the same record as a.V1 (COSMOS in m/s2), which is read instead",)
 

@@ -8,8 +8,8 @@ import pytest
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.errors import TryLater
-from per_obspy.records.contents import growing
-from per_obspy.records.contents.growing import changed_files, file_states, growing_files
+from per_obspy.records import file_list
+from per_obspy.records.file_list import changed_files, file_states, growing_files
 from per_obspy.records.folder import find_stations
 
 OLD = time.time() - 3600
@@ -47,11 +47,11 @@ def test_a_file_that_changes_meanwhile_waits(tmp_path, monkeypatch):
     # a clock of the file server that is ahead, and a writer that goes on
     path = write_record(tmp_path, "A", changed=time.time() + 3600)
     states = file_states([path])
-    monkeypatch.setattr(growing.time, "sleep", lambda _: path.write_bytes(b"more"))
+    monkeypatch.setattr(file_list.time, "sleep", lambda _: path.write_bytes(b"more"))
     assert growing_files(states, 60.0) == {path}
     # the same clock, but a writer that has finished
     path = write_record(tmp_path, "B", changed=time.time() + 3600)
-    monkeypatch.setattr(growing.time, "sleep", lambda _: None)
+    monkeypatch.setattr(file_list.time, "sleep", lambda _: None)
     assert growing_files(file_states([path]), 60.0) == set()
 
 

@@ -6,8 +6,8 @@ import obspy
 import pytest
 from station_files import record
 
-from per_obspy.records.contents.metadata_files import kind_of
 from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.metadata import kind_of
 
 SEED = Path(obspy.__file__).parent / "io" / "xseed" / "tests" / "data"
 
