@@ -17,7 +17,7 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -47,8 +47,8 @@ _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 #: Ways of packing a member of a zip that the standard library knows.
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 
-#: first bytes of a compressed tar -> function that opens it
-_UNPACKERS: dict[bytes, Any] = {
+#: first bytes of a packed file -> function that opens it
+UNPACKERS: dict[bytes, Any] = {
     b"\x1f\x8b": gzip.open,
     b"BZh": bz2.open,
     b"\xfd7zXZ\x00": lzma.open,
@@ -196,7 +196,6 @@ class Allowance:
     def spend(self, size: int) -> None:
         """Count one file of some bytes."""
         self.files += 1
-        self._require(self.files <= self.limits.most_members, "holds", "most_members", "files")
         self.check(size)
         self.total += size
 
@@ -204,16 +203,16 @@ class Allowance:
         """Refuse the archive if that many bytes more are beyond the limits."""
         limits, total = self.limits, self.total + size
         # The sum of all files, and its ratio to the archive as it is stored
-        self._require(total <= limits.largest_total, "unpacks to", "largest_total", "bytes")
-        largest = max(limits.largest_ratio * self.size, SMALL)
-        self._require(total <= largest, "unpacks to", "largest_ratio", "times its packed size")
-
-    def _require(self, fits: bool, verb: str, limit: str, unit: str) -> None:
-        """Refuse an archive beyond a limit."""
-        if not fits:
-            bound = f"records.archives.{limit} = {getattr(self.limits, limit):.15g} {unit}"
-            problem = f"the archive {verb} more than {bound}: unpack it by hand"
-            raise BeyondLimits(self.path, problem)
+        if self.files > limits.most_members:
+            problem = f"most_members = {limits.most_members} files"
+        elif total > limits.largest_total:
+            problem = f"largest_total = {limits.largest_total} bytes"
+        elif total > max(limits.largest_ratio * self.size, SMALL):
+            problem = f"largest_ratio = {limits.largest_ratio:g} times its packed size"
+        else:
+            return
+        problem = f"the archive unpacks to more than records.archives.{problem}"
+        raise BeyondLimits(self.path, f"{problem}: unpack it by hand")
 
 
 class BeyondLimits(RecordRejected):
@@ -397,20 +396,34 @@ def _zip_members(packed: zipfile.ZipFile) -> Iterator[_Member]:
 
 def _plain_tar(file: IO[bytes], allowance: Allowance) -> IO[bytes]:
     """Return a tar as it is, or a copy of a compressed one."""
-    head = file.read(max(map(len, _UNPACKERS)))
+    head = file.read(max(map(len, UNPACKERS)))
     file.seek(0)
-    unpackers = (opened for mark, opened in _UNPACKERS.items() if head.startswith(mark))
-    unpacker = next(unpackers, None)
-    return file if unpacker is None else _temporary_copy(_inflated(file, unpacker, allowance))
+    if not head.startswith((*UNPACKERS,)):
+        return file
+    with file:
+        return _temporary_copy(unpacked(file, head, allowance.check))
 
 
-def _inflated(packed: IO[bytes], unpacker: Any, allowance: Allowance) -> Iterator[bytes]:
-    """Yield the unpacked bytes of a file within the limits; close the file at the end."""
+def unpacked(packed: IO[bytes], head: bytes, check: Callable[[int], None]) -> Iterator[bytes]:
+    """
+    Yield the bytes of a file piece by piece, unpacked if gzip, bzip2 or xz packed it.
+
+    Parameters
+    ----------
+    packed : file object
+        At its beginning.
+    head : bytes
+        Its first bytes, which tell how it is packed.
+    check : callable
+        Called with the number of unpacked bytes as it grows, so that a bomb is refused before it
+        fills memory or disk; raises beyond a limit.
+    """
+    openers = (opened for mark, opened in UNPACKERS.items() if head.startswith(mark))
     total = 0
-    with packed, unpacker(packed) as source:
+    with next(openers, nullcontext)(packed) as source:
         while piece := source.read(PIECE):
             total += len(piece)
-            allowance.check(total)
+            check(total)
             yield piece
 
 

@@ -7,9 +7,7 @@ files are handed over as bytes. Readers that neither belong to this package nor 
 work in a process of their own, with limits of time and memory.
 """
 
-import bz2
 import glob
-import gzip
 import re
 import tarfile
 import warnings
@@ -29,7 +27,7 @@ from per_obspy.files import scratch_folder, writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
-from per_obspy.records.archive import LIMITS, PIECE, SMALL, read_file
+from per_obspy.records.archive import LIMITS, SMALL, read_file, unpacked
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -69,8 +67,8 @@ _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "invento
 #: Formats whose samples are in a second file of the same name.
 _TWO_FILES = ("Q",)
 
-#: first bytes of a packed file -> its decompressor
-_UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
+#: First bytes of files that gzip or bzip2 packed, which are unpacked here.
+_PACKED = (b"\x1f\x8b", b"BZh")
 
 #: Lines of a plain table that may hold titles, and a line of numbers.
 TITLES = 8
@@ -127,26 +125,25 @@ def read_bytes_with_obspy(
 
 def _unpacked(content: bytes, path: Path) -> bytes:
     """Return bytes that gzip or bzip2 packed, up to a limit of size; any other as they are."""
-    unpackers = (opened for mark, opened in _UNPACKERS.items() if content.startswith(mark))
-    unpacker = next(unpackers, None)
-    if unpacker is None:
+    if not content.startswith(_PACKED):
         return content
-    # Piece by piece, so that a bomb is refused before it fills the memory
-    unpacked, problem = BytesIO(), ""
+
+    def check(total: int) -> None:
+        problem = ""
+        if total > LARGEST_UNPACKED:
+            problem = f"{LARGEST_UNPACKED // 1024**2} MiB"
+        elif total > max(LIMITS.largest_ratio * len(content), SMALL):
+            problem = f"{LIMITS.largest_ratio:g} times its packed size"
+        if problem:
+            raise RecordRejected(str(path), f"it unpacks to more than {problem}: unpack it by hand")
+
+    # Pieces are joined in place, so that they are in memory once
+    whole = BytesIO()
     try:
-        with unpacker(BytesIO(content)) as file:
-            while not problem and (piece := file.read(PIECE)):
-                unpacked.write(piece)
-                # The whole, and its ratio to the file as it is stored
-                if unpacked.tell() > LARGEST_UNPACKED:
-                    problem = f"{LARGEST_UNPACKED // 1024**2} MiB"
-                elif unpacked.tell() > max(LIMITS.largest_ratio * len(content), SMALL):
-                    problem = f"{LIMITS.largest_ratio:g} times its packed size"
+        whole.writelines(unpacked(BytesIO(content), content[:4], check))
     except (OSError, EOFError, zlib.error) as error:
         raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
-    if problem:
-        raise RecordRejected(str(path), f"it unpacks to more than {problem}: unpack it by hand")
-    return unpacked.getvalue()
+    return whole.getvalue()
 
 
 def _read(
