@@ -226,6 +226,7 @@ class _Member(NamedTuple):
     size: int  # bytes, unpacked
     place: Any  # by which its archive finds it
     problem: str  # why it cannot be read; empty if it can
+    inside: str = ""  # name of a file inside it, where it is an archive
 
 
 class Archive:
@@ -246,14 +247,14 @@ class Archive:
     Attributes
     ----------
     members : dict
-        Name -> member, and the name inside it where the member is an archive.
+        Name -> member, which for a file of an archive inside is that archive.
     rejected : list of Rejection
         Members that are not read, each with its reason.
     """
 
     def __init__(self, name: str, file: IO[bytes], allowance: Allowance, level: int = 1) -> None:
         self.name, self.allowance, self.level = name, allowance, level
-        self.members: dict[str, tuple[_Member, str]] = {}
+        self.members: dict[str, _Member] = {}
         self.rejected: list[Rejection] = []
         self._file = file
         self._zip: zipfile.ZipFile | None = None
@@ -274,14 +275,14 @@ class Archive:
         if name not in self.members:
             problem = "cannot be read: the archive has no such file"
             raise RecordRejected(f"{self.name}/{name}", problem)
-        member, inside = self.members[name]
-        if not inside:
+        member = self.members[name]
+        if not member.inside:
             return io.BytesIO(b"".join(self._pieces(member)))
         if self._inner is None or self._inner[0] != member.name:
             # The first walk has shown that it is within the limits
             fresh = replace(self.allowance, files=0, total=0)
             self._inner = member.name, self._unpacked(member, fresh)
-        return self._inner[1].open(inside)
+        return self._inner[1].open(member.inside)
 
     def listed(self) -> Iterator[_Member]:
         """Yield all files as the archive describes them, in its order."""
@@ -310,13 +311,10 @@ class Archive:
                 self._reject(member.name, problem)
                 continue
             # The later member of two is the one that unpacking would leave
-            is_inner = is_archive(Path(name))
-            if name in (inner if is_inner else self.members):
+            group = inner if is_archive(Path(name)) else self.members
+            if name in group:
                 self._reject(name, _REPEATED)
-            if is_inner:
-                inner[name] = member._replace(name=name)
-            else:
-                self.members[name] = member, ""
+            group[name] = member._replace(name=name)
         return inner.values()
 
     def _problem(self, name: str, size: int) -> str:
@@ -348,7 +346,7 @@ class Archive:
             whole = f"{archive.name}/{name}"
             if whole in self.members:
                 self._reject(whole, _REPEATED)
-            self.members[whole] = archive, name
+            self.members[whole] = archive._replace(inside=name)
         self.rejected += walked.rejected
 
     def _unpacked(self, archive: _Member, allowance: Allowance) -> "Archive":

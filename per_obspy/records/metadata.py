@@ -215,17 +215,19 @@ def _read_station_text(path: Path, content: bytes) -> Metadata:
     except ValueError:
         faults = {}  # a list of networks, or no list at all
     head, *texts = marked_open_starts(content).decode().split("\n")
-    numbered = enumerate(texts, 2)
-    lines = {number: line for number, line in numbered if line.strip() and number not in faults}
+    lines = {
+        number: line
+        for number, line in enumerate(texts, 2)
+        if line.strip() and number not in faults
+    }
     try:
         inventory = _station_text(path, head, *lines.values())
     except RecordRejected:
         # Only where the whole cannot be read, line by line for columns that ObsPy alone reads
-        refused = _refused_lines(path, head, lines)
-        faults |= refused
-        good = (line for number, line in lines.items() if number not in refused)
+        faults |= _refused_lines(path, head, lines)
+        good = (line for number, line in lines.items() if number not in faults)
         inventory = _station_text(path, head, *good)
-    reasons = [f"line {number}: {faults[number]}" for number in sorted(faults)]
+    reasons = [shortened(f"line {number}: {fault}") for number, fault in sorted(faults.items())]
     # A file of which nothing is left is none
     if reasons and not any(inventory):
         raise RecordRejected(str(path), *(f"is no FDSN station text: {text}" for text in reasons))
