@@ -244,7 +244,7 @@ def _text(path: Path) -> str:
 
     try:
         with path.open("rb") as file:
-            head = file.read(6)
+            head = file.read(2)  # of gzip alone
             file.seek(0)
             text = b"".join(unpacked(file, head, check)).decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
