@@ -14,7 +14,8 @@ from per_obspy.files import content_hash, written_whole
 from per_obspy.inventory.files.side_file import side_file
 from per_obspy.pipeline.inputs.drawn_pairs import layer_files
 from per_obspy.pipeline.inputs.extras import require_extras
-from per_obspy.records.contents.input_files import hash_if_readable, input_files
+from per_obspy.records.archive import hash_if_readable
+from per_obspy.records.file_list import input_files
 
 if TYPE_CHECKING:
     from per_obspy.records.fdsn.cache import Fetched

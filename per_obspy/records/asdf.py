@@ -17,20 +17,24 @@ from typing import Any
 
 import netCDF4
 import numpy as np
-import obspy
-from obspy import Inventory, Stream, Trace, UTCDateTime
+from obspy import Inventory, Stream, Trace, UTCDateTime, read_events, read_inventory
 from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, Rejection
-from per_obspy.records.contents.metadata_files import merged_inventory
 from per_obspy.records.folder import SourceContents
-from per_obspy.records.metadata import with_metadata
+from per_obspy.records.metadata import merged_inventory, with_metadata
 from per_obspy.records.obspy_readers import LARGEST_UNPACKED, read_bytes_with_obspy
 from per_obspy.units import motion_unit
 
 #: First bytes of an HDF5 file, which every ASDF file is.
 ASDF_MARK = b"\x89HDF\r\n\x1a\n"
+
+#: Errors of netCDF, HDF5 and their users for damaged files.
+_DAMAGES = (
+    *(OSError, RuntimeError, LookupError, AttributeError),
+    *(ValueError, TypeError, ArithmeticError),
+)
 
 _OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]{0,500}>([^<]{1,100})<")
 
@@ -61,30 +65,31 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> SourceCo
     CatalogError
         If it is no ASDF file or has no waveform of the tag.
     """
+    inventories, rejected = [], []
     with _opened(Path(path)) as file:
         groups = file["Waveforms"].groups if "Waveforms" in file.groups else {}
-        stations: dict[str, tuple[Path, ...]] = {}
-        for name, group in sorted(groups.items()):
-            if _names(group, tag):
-                stations[name] = (Path(path),)
-        if not stations:
-            raise CatalogError(str(path), _no_waveform(groups, tag))
+        tagged = [name for name in sorted(groups) if _names(groups[name], tag)]
+        if not tagged:
+            tags = {_tag(name) for group in groups.values() for name in _names(group, "*")}
+            problem = f"has no waveform of tag {tag}, only of {', '.join(sorted(tags)) or 'none'}"
+            raise CatalogError(str(path), problem)
         # StationXML of every station, which may be damaged
-        inventories, rejected = [], []
-        for name in stations:
+        for name in tagged:
             try:
                 inventories += _inventories(groups[name], f"{path}/{name}")
             except RecordRejected as rejection:
                 rejected.append(Rejection("file", name, str(path), None, rejection.reasons))
+    # All stations are in the one file
+    stations: dict[str, tuple[Path, ...]] = dict.fromkeys(tagged, (Path(path),))
     return SourceContents(stations, merged_inventory(inventories), tuple(rejected))
 
 
-def _no_waveform(groups: dict[str, Any], tag: str) -> str:
-    """Return the reason why no station is found: the tags that there are."""
-    tags: set[str] = set()
-    for group in groups.values():
-        tags.update(_tag(name) for name in _names(group, "*"))
-    return f"has no waveform of tag {tag}, only of {', '.join(sorted(tags)) or 'none'}"
+def _inventories(group: Any, name: str) -> list[Inventory]:
+    """Return the StationXML of a station, if there is any."""
+    if "StationXML" not in group.variables:
+        return []
+    content = _bytes(group.variables["StationXML"])
+    return [read_bytes_with_obspy(read_inventory, content, name)]
 
 
 def read_asdf_station(
@@ -99,11 +104,14 @@ def read_asdf_station(
                 # A waveform that is refused does not stop the others
                 for name in _names(group, tag):
                     try:
-                        stream += with_metadata(_trace(file, group.variables[name]), inventory)
+                        with _damage_as(RecordRejected, name, "the workspace is damaged"):
+                            trace = _trace(file, group.variables[name])
+                        stream += with_metadata(trace, inventory)
                         stream[-1].stats.source = str(path)
                     except RecordRejected as rejection:
-                        record = (name.split("__")[0], str(path), None, rejection.reasons)
-                        rejected.append(Rejection("record", *record))
+                        record = name.split("__")[0]
+                        row = Rejection("record", record, str(path), None, rejection.reasons)
+                        rejected.append(row)
         except CatalogError as error:
             rejected.append(Rejection("station", station, str(path), None, (error.problem,)))
     return stream, tuple(rejected)
@@ -122,7 +130,7 @@ def read_asdf_events(path: Path) -> list[Event]:
         content = _bytes(file["QuakeML"]) if "QuakeML" in file.variables else b""
     # A file without QuakeML holds no event
     try:
-        found = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
+        found = read_bytes_with_obspy(read_events, content, str(path)) if content else []
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     return list(found)
@@ -139,29 +147,30 @@ def _opened(path: Path) -> Iterator[netCDF4.Dataset]:
     """Open an ASDF file; whatever HDF5 finds wrong with it becomes a ``CatalogError``."""
     if not path.is_file():
         raise CatalogError(str(path), "cannot be read as ASDF: no such file")
-    try:
+    with _damage_as(CatalogError, str(path), "cannot be read as ASDF"):
         file = netCDF4.Dataset(path)
-    except Exception as error:
-        raise CatalogError(str(path), f"cannot be read as ASDF: {_damage(error)}") from error
     # Faults below the groups show while they are read
+    with _damage_as(CatalogError, str(path), "the workspace is damaged"), file:
+        if "file_format" not in file.ncattrs() or file.getncattr("file_format") != "ASDF":
+            raise CatalogError(str(path), "is HDF5, but no ASDF file")
+        # A sample that netCDF takes for missing is a sample
+        file.set_auto_maskandscale(False)
+        yield file
+
+
+@contextmanager
+def _damage_as(
+    refusal: type[CatalogError] | type[RecordRejected], name: str, problem: str
+) -> Iterator[None]:
+    """Turn the errors of libraries for damaged files into a refusal, on one line."""
     try:
-        with file:
-            if "file_format" not in file.ncattrs() or file.getncattr("file_format") != "ASDF":
-                raise CatalogError(str(path), "is HDF5, but no ASDF file")
-            # A sample that netCDF takes for missing is a sample
-            file.set_auto_maskandscale(False)
-            yield file
+        yield
     except PerError:
         raise
-    except Exception as error:
-        raise CatalogError(str(path), f"the workspace is damaged: {_damage(error)}") from error
-
-
-def _damage(error: Exception) -> str:
-    """Return the fault of a file on one line."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    except _DAMAGES as error:
+        text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else text
+        raise refusal(name, f"{problem}: {reason}") from error
 
 
 def _values(variable: Any) -> Any:
@@ -186,30 +195,11 @@ def _names(group: Any, tag: str) -> list[str]:
 
 
 def _tag(name: str) -> str:
+    """Return the tag at the end of the name of a waveform."""
     return name.split("__")[-1]
 
 
-def _inventories(group: Any, name: str) -> list[Inventory]:
-    """Return the StationXML of a station, if there is any."""
-    if "StationXML" not in group.variables:
-        return []
-    content = _bytes(group.variables["StationXML"])
-    return [read_bytes_with_obspy(obspy.read_inventory, content, name)]
-
-
 def _trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
-    """Return a waveform, whatever is wrong with which rejects it alone."""
-    try:
-        return _described_trace(file, waveform)
-    except PerError:
-        raise
-    except Exception as error:
-        raise RecordRejected(
-            waveform.name, f"the workspace is damaged: {_damage(error)}"
-        ) from error
-
-
-def _described_trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
     """Return a waveform with the words of its processing; without any it counts as raw."""
     identifier, tag = waveform.name.split("__")[0], _tag(waveform.name)
     rate = float(waveform.sampling_rate)
@@ -228,7 +218,14 @@ def _described_trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
 
 def _describe_processed(file: netCDF4.Dataset, trace: Trace, name: str) -> None:
     """Put a processed waveform into m/s2, with the words of the vocabulary."""
-    trace.data = trace.data * _output_unit(file, trace, name)
+    provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
+    steps = "" if provenance is None else _bytes(provenance).decode("utf-8", "replace")
+    # The unit of the last step; one that is missing or unknown must not be guessed
+    word = ["no unit", *_OUTPUT_UNITS.findall(steps)][-1]
+    unit = motion_unit(word)
+    if unit is None or unit.quantity != "acceleration":
+        raise RecordRejected(trace.id, f"its provenance gives {word} as output_units")
+    trace.data = trace.data * unit.factor
     trace.stats.update(
         {"units": "m/s2", "quantity": "acceleration", "processing_level": "processed"}
     )
@@ -241,27 +238,12 @@ def _describe_processed(file: netCDF4.Dataset, trace: Trace, name: str) -> None:
     trace.stats.corners = AttribDict(known)
 
 
-def _output_unit(file: netCDF4.Dataset, trace: Trace, name: str) -> float:
-    """Return the unit of the last step of the processing, m/s2."""
-    provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
-    steps = "" if provenance is None else _bytes(provenance).decode("utf-8", "replace")
-    units = _OUTPUT_UNITS.findall(steps)
-    unit = motion_unit(units[-1]) if units else None
-    # A unit that is missing or unknown must not be guessed
-    if unit is None or unit.quantity != "acceleration":
-        name = units[-1] if units else "no unit"
-        raise RecordRejected(trace.id, f"its provenance gives {name} as output_units")
-    return unit.factor
-
-
 def _auxiliary(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:
-    """Return gmprocess's auxiliary data of a stream or trace; empty if there is none."""
-    station = ".".join(name.split(".")[:2])
-    groups = file.groups.get("AuxiliaryData")
-    for part in (kind, station):
-        groups = groups.groups.get(part) if groups is not None else None
-    # Data of a stream or trace is JSON
-    if groups is None or name not in groups.variables:
+    """Return gmprocess's auxiliary data of a stream or trace, JSON; empty if there is none."""
+    group: Any = file
+    for part in ("AuxiliaryData", kind, ".".join(name.split(".")[:2])):
+        group = group.groups.get(part) if group is not None else None
+    if group is None or name not in group.variables:
         return {}
-    content: dict[str, Any] = json.loads(_bytes(groups.variables[name]))
+    content: dict[str, Any] = json.loads(_bytes(group.variables[name]))
     return content

@@ -9,7 +9,7 @@ from obspy.core.event import Event, Magnitude
 
 from per_obspy.errors import CatalogError, RecordRejected, reason_of
 from per_obspy.files import bytes_hash, file_hash
-from per_obspy.records.archives.archive_files import open_file
+from per_obspy.records.archive import open_file
 from per_obspy.records.asdf import ASDF_MARK, read_asdf_events
 from per_obspy.records.obspy_readers import read_content
 

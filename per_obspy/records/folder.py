@@ -1,9 +1,11 @@
 """
-A folder of records: every file that ObsPy and its plugins understand.
+A folder of records: every file that ObsPy and its plugins understand, and one station of it.
 
-StationXML may be in the same folder or elsewhere.
+StationXML may be in the same folder or elsewhere. Of the several forms in which agencies write a
+record one is read: acceleration rather than its integrals, physical units rather than counts.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
@@ -16,37 +18,40 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from per_obspy.config import Archives
 from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, TryLater
 from per_obspy.files import bytes_hash
-from per_obspy.formats.text.itaca_metadata import read_itaca_metadata
-from per_obspy.formats.text.station_table import (
-    StationRow,
-    bare_name,
-    located_stations,
-    read_station_table,
-)
+from per_obspy.formats.text.station_table import bare_name, located_stations
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.notes import taken
-from per_obspy.records.archives.archive_files import LIMITS, archive_files, read_file
-from per_obspy.records.archives.walked import is_archive
-from per_obspy.records.contents.file_list import files_below, is_document
-from per_obspy.records.contents.growing import (
+from per_obspy.records.archive import LIMITS, archive_files, is_archive, read_file
+from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
+from per_obspy.records.file_list import (
     FileState,
     changed_files,
+    file_row,
     file_states,
+    files_below,
     growing_files,
+    is_document,
 )
-from per_obspy.records.contents.metadata_files import (
+from per_obspy.records.metadata import (
     METADATA,
+    Metadata,
     kind_of,
     merged_inventory,
     named_metadata,
-    read_station_text,
+    read_metadata,
+    with_metadata,
 )
-from per_obspy.records.contents.one_series import without_doubles, without_integrals
-from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
-from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
-from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import UNKNOWN_FORMAT, read_content
 from per_obspy.records.processed_files import described
+
+#: Kinds of files, in the order of the rows of unusable ones.
+_KINDS = ("record", *METADATA)
+
+#: Difference of durations that decides between two forms of a record, s.
+_STEP = 10.0
+
+#: unit of a series -> its quantity, for the integrals of acceleration
+_INTEGRALS = {"m/s": "velocity", "m": "displacement"}
 
 
 class SourceContents(NamedTuple):
@@ -76,6 +81,17 @@ class SourceContents(NamedTuple):
     hashes: Mapping[Path, str] = MappingProxyType({})
     records: tuple[RecordSpan, ...] = ()
     waiting: tuple[Path, ...] = ()
+
+
+class _File(NamedTuple):
+    """A file of a folder: hash, kind, and its records, its metadata or the reason for neither."""
+
+    path: Path
+    hash: str = ""
+    kind: str = "record"
+    records: tuple[RecordSpan, ...] = ()
+    metadata: Metadata = Metadata()
+    faults: tuple[str, ...] = ()
 
 
 def find_stations(
@@ -110,80 +126,82 @@ def find_stations(
     TryLater
         If every file is still being written.
     """
-    found, rejected, waiting = _read_files(Path(folder), limits, settle)
-    records = _records(found)
+    files, rejected, waiting = _read_files(Path(folder), limits, settle)
+    records = _records(files)
     # Metadata that is named comes before that of the folder
-    inventories, rows = named_metadata(None if stationxml is None else Path(stationxml))
-    inventories += [file.inventory for file in found if file.inventory is not None]
-    rows += chain.from_iterable(file.rows for file in found)
-    # Unusable records come before unusable metadata
-    for kind in ("record", *METADATA):
-        rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
+    metadata = named_metadata(None if stationxml is None else Path(stationxml))
+    metadata += [file.metadata for file in files]
     if not records:
-        # A folder without records may fill up; a file that was named should have been one
-        nothing = NothingUsable if Path(folder).is_dir() else CatalogError
-        raise nothing(str(folder), _nothing_found(len(found), rejected))
+        raise _nothing_usable(Path(folder), len(files), rejected)
     stations = station_files(records)
+    inventories = [one.inventory for one in metadata if one.inventory is not None]
     # Tables of coordinates serve the stations that have records
-    if rows:
+    if rows := [row for one in metadata for row in one.rows]:
         inventories.append(located_stations(rows, stations))
-    return SourceContents(
-        stations,
-        merged_inventory(inventories),
-        tuple(rejected),
-        {file.path: file.hash for file in found if file.hash},
-        records,
-        waiting,
-    )
+    hashes = {file.path: file.hash for file in files if file.hash}
+    whole = merged_inventory(inventories)
+    return SourceContents(stations, whole, tuple(rejected), hashes, records, waiting)
+
+
+def _nothing_usable(folder: Path, files: int, rejected: list[Rejection]) -> CatalogError:
+    """Return the error of a folder without a station, with the first fault as an example."""
+    problem = f"none of its {files} files is a record"
+    example = ": there is only metadata"
+    if rejected:
+        example = f"; {rejected[0].name}: {'; '.join(rejected[0].reasons)}"
+    # A folder without records may fill up; a file that was named should have been one
+    nothing = NothingUsable if folder.is_dir() else CatalogError
+    return nothing(str(folder), problem + example)
 
 
 def _read_files(
     folder: Path, limits: Archives, settle: float
-) -> "tuple[list[_File], list[Rejection], tuple[Path, ...]]":
+) -> tuple[list[_File], list[Rejection], tuple[Path, ...]]:
     """Read the files of a folder; return unreadable ones, and those that are still written."""
-    paths, rejected = _paths(folder)
+    if not folder.exists():
+        raise CatalogError(str(folder), "no such folder or file")
+    # A file counts as the only one of its folder
+    paths, rejected = ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
     states, waiting = _settled(folder, paths, settle)
-    files = _files([path for path in paths if path not in waiting], rejected, limits)
+    files = list[_File]()
+    for path in sorted({*paths} - waiting):
+        members, unread = _members(path, limits)
+        files += [_read_file(member, limits) for member in members]
+        rejected += unread
     if not files and not rejected:
         raise NothingUsable(str(folder), "the folder is empty")
-    found = [_read_file(path, limits) for path in files]
     # A file that has changed since is half of one
     waiting |= changed_files(states)
-    found = [file for file in found if not waiting.intersection((file.path, *file.path.parents))]
-    return found, rejected, tuple(sorted(waiting))
+    files = [file for file in files if not waiting.intersection((file.path, *file.path.parents))]
+    # Unusable records come before unusable metadata
+    unusable = (file for kind in _KINDS for file in files if file.kind == kind and file.faults)
+    rejected += [file_row(file.path, *file.faults) for file in unusable]
+    return files, rejected, tuple(sorted(waiting))
 
 
 def _settled(
     folder: Path, paths: list[Path], settle: float
 ) -> tuple[dict[Path, FileState], set[Path]]:
     """Return the state of the files that can be read, and the files that are still written."""
-    if settle <= 0:
-        return {}, set()
-    # A folder without a finished file is read later
-    states = file_states(paths)
+    states = file_states(paths) if settle > 0 else {}
     waiting = growing_files(states, settle)
+    # A folder without a finished file is read later
     if waiting and waiting == set(states):
         reason = f"its {len(waiting)} files are still being written, try again in {settle:g} s"
         raise TryLater(f"{folder}: {reason}")
     return {path: state for path, state in states.items() if path not in waiting}, waiting
 
 
-class _File(NamedTuple):
-    """A file of a folder: hash, kind, and its records, its metadata or the reason for neither."""
-
-    path: Path
-    hash: str = ""
-    kind: str = "record"
-    records: tuple[RecordSpan, ...] = ()
-    inventory: Inventory | None = None
-    rows: tuple[StationRow, ...] = ()
-    events: Mapping[str, HeaderEvent] = MappingProxyType({})
-    rejection: Rejection | None = None
+def _members(path: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]:
+    """Return the files in an archive, or a file itself; an archive may be unreadable."""
+    try:
+        return archive_files(path, limits) if is_archive(path) else ([path], [])
+    except RecordRejected as rejection:
+        return [], [file_row(path, *rejection.reasons)]
 
 
 def _read_file(path: Path, limits: Archives) -> _File:
     """Read a file of a folder once: its hash, and the headers of its records or its metadata."""
-    # Bytes are read once and serve the hash as well
     file = _File(path)
     try:
         content = read_file(path, limits)
@@ -192,51 +210,28 @@ def _read_file(path: Path, limits: Archives) -> _File:
         if file.kind == "record":
             stream = _traces(path, content, headonly=True)
             return file._replace(records=tuple(record_span(trace, path) for trace in stream))
-        if file.kind == "inventory":
-            inventory = read_content(obspy.read_inventory, content, path)
-            return file._replace(inventory=inventory)
-        if file.kind == "station text":
-            return _with_station_text(file, content)
-        if file.kind == "station table":
-            return file._replace(rows=read_station_table(str(path), content))
-        if file.kind == "ITACA metadata":
-            return _with_itaca_metadata(file, content)
+        if file.kind in METADATA:
+            metadata = read_metadata(file.kind, path, content)
+            return file._replace(metadata=metadata, faults=metadata.faults)
     except RecordRejected as rejection:
         # Documents that agencies pack with records are no records
         if is_document(path) and UNKNOWN_FORMAT in rejection.reasons[0]:
             return file._replace(kind="document")
-        return file._replace(rejection=_rejected_file(path, rejection))
+        return file._replace(faults=rejection.reasons)
     return file
 
 
-def _with_station_text(file: _File, content: bytes) -> _File:
-    """Return a file with the stations of its lines, and the lines that cannot be read."""
-    inventory, faults = read_station_text(file.path, content)
-    rejection = RecordRejected(str(file.path), *faults) if faults else None
-    row = _rejected_file(file.path, rejection) if rejection else None
-    return file._replace(inventory=inventory, rejection=row)
-
-
-def _with_itaca_metadata(file: _File, content: bytes) -> _File:
-    """Return a file with the station and the earthquake of a metadata file of ITACA."""
-    found = read_itaca_metadata(str(file.path), content)
-    event = header_event(found.event)
-    events = dict.fromkeys(found.row.names, event) if event else {}
-    return file._replace(rows=(found.row,), events=events)
-
-
-def _records(found: list[_File]) -> tuple[RecordSpan, ...]:
+def _records(files: Iterable[_File]) -> tuple[RecordSpan, ...]:
     """Return the records of all files, with the earthquake that metadata of their station name."""
-    events = dict(chain.from_iterable(file.events.items() for file in found))
-    records = chain.from_iterable(file.records for file in found)
-    return tuple(_with_event(record, events) for record in records)
-
-
-def _with_event(record: RecordSpan, events: Mapping[str, HeaderEvent]) -> RecordSpan:
-    """Return a record with the event of its station's metadata if that has more facts."""
-    event = events.get(bare_name(record.station.split(".", 1)[1]))
-    known = record.event.known if record.event else 0
-    return record._replace(event=event) if event and event.known > known else record
+    metadata = [file.metadata for file in files if file.metadata.event]
+    events = {name: one.event for one in metadata for row in one.rows for name in row.names}
+    records = [record for file in files for record in file.records]
+    # The one that has more facts counts
+    for place, record in enumerate(records if events else ()):
+        event = events.get(bare_name(record.station.split(".", 1)[1]))
+        if event and event.known > (record.event.known if record.event else 0):
+            records[place] = record._replace(event=event)
+    return tuple(records)
 
 
 def _traces(path: Path, content: bytes, **options: Any) -> Stream:
@@ -249,6 +244,11 @@ def _traces(path: Path, content: bytes, **options: Any) -> Stream:
 def station_name(trace: Trace) -> str:
     """Return ``"NET.STA"`` of a trace."""
     return f"{trace.stats.network}.{trace.stats.station}"
+
+
+def trace_row(trace: Trace, *reasons: str) -> Rejection:
+    """Return the row of a trace that is not used."""
+    return Rejection("record", trace.id, str(trace.stats.source), None, reasons)
 
 
 def read_station(
@@ -292,51 +292,79 @@ def read_station(
             traces = _traces(path, content, headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
             raise_machine_fault(rejection)
-            rejected.append(_rejected_file(path, rejection))
+            rejected.append(file_row(path, *rejection.reasons))
             continue
         # A trace that is refused does not stop the others of its file
         for trace in taken(traces):
             if station not in (None, station_name(trace)):
                 continue
+            trace.stats.source = str(path)
             try:
                 stream += with_metadata(trace, inventory)
-                stream[-1].stats.source = str(path)
             except RecordRejected as rejection:
-                rejected.append(Rejection("record", trace.id, str(path), None, rejection.reasons))
-    stream, integrals = without_integrals(stream)
-    stream, doubles = without_doubles(stream)
-    return stream, (*rejected, *integrals, *doubles)
+                rejected.append(trace_row(trace, *rejection.reasons))
+    stream, others = one_series(stream)
+    return stream, (*rejected, *others)
 
 
-def _paths(folder: Path) -> tuple[list[Path], list[Rejection]]:
-    """Return the files of a folder, archives unopened, and whatever else is there."""
-    if not folder.exists():
-        raise CatalogError(str(folder), "no such folder or file")
-    # A file counts as the only one of its folder
-    return ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
+def one_series(stream: Stream) -> tuple[Stream, list[Rejection]]:
+    """
+    Return a stream with one form of every record that agencies give in several.
+
+    Agencies write the integrals of a record to the same folder, under the same codes: velocity and
+    displacement are left out where their acceleration is there too. A folder may also hold a
+    record as counts and as acceleration (V0 and V1), or in two formats (SMC and RAW). Of the forms
+    of one channel and state (raw or processed) that overlap in time, the longest stays (in steps
+    of 10 s), of several one in physical units, of these the first by format and file. A form that
+    does not overlap, in time or by its channel code, is another record.
+    """
+    accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
+    left_out, doubles = dict[int, Rejection](), dict[int, Rejection]()
+    # Channel and state, format and unit -> series
+    channels: dict[tuple[str, str], dict[tuple[str, str], list[Trace]]] = defaultdict(dict)
+    for trace in stream:
+        level, form, units = _form(trace)
+        if units in _INTEGRALS and trace.id in accelerations:
+            reason = f"{_INTEGRALS[units]} series, acceleration is read instead"
+            left_out[id(trace)] = trace_row(trace, reason)
+        else:
+            channels[trace.id, level].setdefault((form, units), []).append(trace)
+    for forms in channels.values():
+        doubles |= _doubles(list(forms.values()))
+    # The order of the files stays
+    left_out |= doubles
+    kept = Stream([trace for trace in stream if id(trace) not in left_out])
+    return kept, list(left_out.values())
 
 
-def _files(paths: list[Path], rejected: list[Rejection], limits: Archives) -> list[Path]:
-    """Return all files, those in archives included; note the archives that cannot be read."""
-    files = []
-    for path in paths:
-        try:
-            inside, unread = archive_files(path, limits) if is_archive(path) else ([path], [])
-            files += inside
-            rejected += unread
-        except RecordRejected as rejection:
-            rejected.append(_rejected_file(path, rejection))
-    return files
+def _doubles(forms: list[list[Trace]]) -> dict[int, Rejection]:
+    """Return the rows of series that the best form of their channel has too, by their object."""
+    best, rows = min(forms, key=_rank), dict[int, Rejection]()
+    # Only where both have samples of the same time
+    for trace in chain.from_iterable(form for form in forms if form is not best):
+        same = next((read for read in best if _overlap(trace, read)), None)
+        if same is not None:
+            words = " in ".join(_form(same)[1:]).strip()
+            reason = f"the same record as {same.stats.source} ({words}), which is read instead"
+            rows[id(trace)] = trace_row(trace, reason)
+    return rows
 
 
-def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
-    """Return the row of an unusable file."""
-    return Rejection("file", path.name, str(path), None, rejection.reasons)
+def _form(trace: Trace) -> tuple[str, str, str]:
+    """Return the state of a record, raw or processed, its format and its unit."""
+    level, form, units = map(trace.stats.get, ("processing_level", "_format", "units"))
+    return str(level or ""), str(form or ""), str(units or "")
 
 
-def _nothing_found(files: int, rejected: list[Rejection]) -> str:
-    """Return the reason why a folder has no station, with the first fault as an example."""
-    problem = f"none of its {files} files is a record"
-    if not rejected:
-        return f"{problem}: there is only metadata"
-    return f"{problem}; {rejected[0].name}: {'; '.join(rejected[0].reasons)}"
+def _rank(traces: list[Trace]) -> tuple[int, bool, str, str]:
+    """Return the sorting key of a form: duration, physical units, format and file."""
+    seconds = sum(float(trace.stats.npts * trace.stats.delta) for trace in traces)
+    _, form, units = _form(traces[0])
+    first = min(str(trace.stats.source) for trace in traces)
+    return -round(seconds / _STEP), units == "counts", form, first
+
+
+def _overlap(first: Trace, second: Trace) -> bool:
+    """Return whether two series share time."""
+    start = max(first.stats.starttime, second.stats.starttime)
+    return bool(min(first.stats.endtime, second.stats.endtime) > start)

@@ -7,9 +7,7 @@ files are handed over as bytes. Readers that neither belong to this package nor 
 work in a process of their own, with limits of time and memory.
 """
 
-import bz2
 import glob
-import gzip
 import re
 import tarfile
 import warnings
@@ -29,9 +27,7 @@ from per_obspy.files import scratch_folder, writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
-from per_obspy.records.archives.archive_files import LIMITS, read_file
-from per_obspy.records.archives.packed import PIECE
-from per_obspy.records.archives.walked import SMALL
+from per_obspy.records.archive import LIMITS, SMALL, read_file, unpacked
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -67,13 +63,12 @@ _CHECKS: dict[str, Callable[[bytes, str], None]] = {
 
 #: name of a reader of ObsPy -> kind of its plugins
 _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
-_READERS = {kind: reader for reader, kind in _KINDS.items()}
 
 #: Formats whose samples are in a second file of the same name.
 _TWO_FILES = ("Q",)
 
-#: first bytes of a packed file -> its decompressor
-_UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
+#: First bytes of files that gzip or bzip2 packed, which are unpacked here.
+_PACKED = (b"\x1f\x8b", b"BZh")
 
 #: Lines of a plain table that may hold titles, and a line of numbers.
 TITLES = 8
@@ -85,14 +80,6 @@ _OTHER_PACKERS = {b"\xfd7zXZ\x00": "xz", b"\x28\xb5\x2f\xfd": "Zstandard", b"7z\
 LARGEST_UNPACKED = 512 * 1024**2
 
 
-class _File(BytesIO):
-    """Bytes of a file under its name, which may end with a direction."""
-
-    def __init__(self, content: bytes, name: str) -> None:
-        super().__init__(content)
-        self.name = name
-
-
 def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
     """
     Call a reader of ObsPy on a file, or on a member of an archive.
@@ -102,7 +89,7 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
     reader : callable
         ``obspy.read``, ``obspy.read_inventory`` or ``obspy.read_events``.
     path : Path
-        File, or a member of an archive as ``records.archives.archive_files`` names it.
+        File, or a member of an archive as ``records.archive`` names it.
     **options
         For the reader.
 
@@ -118,77 +105,48 @@ def read_content(reader: Callable[..., Any], content: bytes, path: Path, **optio
     """
     Call a reader of ObsPy on the bytes of a file, so that the file itself is opened only once.
 
-    Parameters
-    ----------
-    reader : callable
-        ``obspy.read``, ``obspy.read_inventory`` or ``obspy.read_events``.
-    content : bytes
-        Content of the file, which may be packed by gzip or bzip2.
-    path : Path
-        File, or a member of an archive as ``records.archives.archive_files`` names it.
-    **options
-        For the reader.
-
-    Raises
-    ------
-    RecordRejected
-        Whatever the reader raises.
+    Parameters and errors are those of :func:`read_with_obspy`; gzip or bzip2 may have packed the
+    content.
     """
-    return _called(reader, _unpacked(content, path), path, options)
+    return _read(reader, _unpacked(content, path), path, options)
 
 
 def read_bytes_with_obspy(
     reader: Callable[..., Any], content: bytes, name: str, **options: Any
 ) -> Any:
     """
-    Call a reader of ObsPy on bytes.
+    Call a reader of ObsPy on the answer of a service, or on a part of a file.
 
-    Parameters
-    ----------
-    reader, **options
-        As for :func:`read_with_obspy`.
-    content : bytes
-        Answer of a service, or a part of a file.
-    name : str
-        Of its source, for messages.
-
-    Raises
-    ------
-    RecordRejected
-        Whatever the reader raises.
+    Parameters and errors are those of :func:`read_with_obspy`; the name is that of the source of
+    the content, for messages.
     """
-    return _called(reader, content, name, options)
+    return _read(reader, content, name, options)
 
 
 def _unpacked(content: bytes, path: Path) -> bytes:
     """Return bytes that gzip or bzip2 packed, up to a limit of size; any other as they are."""
-    unpackers = (opened for mark, opened in _UNPACKERS.items() if content.startswith(mark))
-    unpacker = next(unpackers, None)
-    if unpacker is None:
+    if not content.startswith(_PACKED):
         return content
-    # Piece by piece, so that a bomb is refused before it fills the memory
-    unpacked = BytesIO()
+
+    def check(total: int) -> None:
+        problem = ""
+        if total > LARGEST_UNPACKED:
+            problem = f"{LARGEST_UNPACKED // 1024**2} MiB"
+        elif total > max(LIMITS.largest_ratio * len(content), SMALL):
+            problem = f"{LIMITS.largest_ratio:g} times its packed size"
+        if problem:
+            raise RecordRejected(str(path), f"it unpacks to more than {problem}: unpack it by hand")
+
+    # Pieces are joined in place, so that they are in memory once
+    whole = BytesIO()
     try:
-        with unpacker(BytesIO(content)) as file:
-            while piece := file.read(PIECE):
-                unpacked.write(piece)
-                _require_size(unpacked.tell(), len(content), path)
+        whole.writelines(unpacked(BytesIO(content), content[:4], check))
     except (OSError, EOFError, zlib.error) as error:
         raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
-    return unpacked.getvalue()
+    return whole.getvalue()
 
 
-def _require_size(unpacked: int, packed: int, path: Path) -> None:
-    """Refuse a packed file that unpacks to more than the limits, bytes."""
-    if unpacked > LARGEST_UNPACKED:
-        problem = f"it unpacks to more than {LARGEST_UNPACKED // 1024**2} MiB: unpack it by hand"
-        raise RecordRejected(str(path), problem)
-    if unpacked > max(LIMITS.largest_ratio * packed, SMALL):
-        problem = f"it unpacks to more than {LIMITS.largest_ratio:g} times its packed size"
-        raise RecordRejected(str(path), f"{problem}: unpack it by hand")
-
-
-def _called(
+def _read(
     reader: Callable[..., Any], content: bytes, source: Path | str, options: dict[str, Any]
 ) -> Any:
     """Call a reader; its errors, of ObsPy's bare Exception or of any library below, reject."""
@@ -203,11 +161,11 @@ def _called(
         # Faults that ObsPy would not notice, or not survive
         if name in _CHECKS:
             _CHECKS[name](content, str(source))
+        options |= {"format": name, "check_compression": False}
         if name in _HERE:
-            options |= {"format": name, "check_compression": False}
-            return reader(_File(content, str(source)), **options)
+            return reader(_named(content, str(source)), **options)
         place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
-        return _value_apart(kind, content, place, name, options)
+        return _value_apart(reader.__name__, content, place, options)
     except BeyondLimits as error:
         raise RecordRejected(str(source), f"{error}: damaged, or no {name} file") from error
     except PerError:
@@ -216,32 +174,34 @@ def _called(
         raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
 
 
-def _value_apart(kind: str, content: bytes, *arguments: Any) -> Any:
-    """Return what a reader in the process of readers returns, and pass its warnings on."""
-    value, doubts = read_apart(_limits(len(content)), _read_apart, kind, content, *arguments)
+def _named(content: bytes, name: str) -> BytesIO:
+    """Return bytes of a file under its name, which may end with a direction."""
+    file = BytesIO(content)
+    file.name = name
+    return file
+
+
+def _value_apart(reader: str, content: bytes, *arguments: Any) -> Any:
+    """
+    Return what a reader in the process of readers returns, and pass its warnings on.
+
+    Limits are reasoned: WIN, the slowest reader, takes 5 s for each MiB; numbers in memory, and
+    texts of a few letters, take at most 40 times their place in a file.
+    """
+    limits = Limits(20.0 + 20.0 * len(content) / 2**20, (1 << 30) + 40 * len(content))
+    value, doubts = read_apart(limits, _read_apart, reader, content, *arguments)
     for doubt in doubts:
         warnings.warn(doubt, stacklevel=2)
     return value
 
 
-def _limits(size: int) -> Limits:
-    """
-    Return the limits of reading a file of a size, bytes.
-
-    Reasoned: WIN, the slowest reader, takes 5 s for each MiB; numbers in memory, and texts of a few
-    letters, take at most 40 times their place in a file.
-    """
-    return Limits(20.0 + 20.0 * size / 2**20, (1 << 30) + 40 * size)
-
-
 def _read_apart(
-    kind: str, content: bytes, place: str | None, name: str, options: dict[str, Any]
+    reader: str, content: bytes, place: str | None, options: dict[str, Any]
 ) -> tuple[Any, list[str]]:
     """Read a file, by its bytes or its place, in the process of readers; return warnings too."""
-    reader, file = getattr(obspy, _READERS[kind]), place or BytesIO(content)
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always")
-        value = reader(file, format=name, check_compression=False, **options)
+        value = getattr(obspy, reader)(place or BytesIO(content), **options)
     return value, [str(doubt.message) for doubt in doubts]
 
 

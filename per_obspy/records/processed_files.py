@@ -17,50 +17,27 @@ import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
-from per_obspy.errors import PerError, RecordRejected
+from per_obspy.errors import RecordRejected
 from per_obspy.files import bytes_hash, file_hash, written_whole
 
-#: words of ``trace.stats`` that a description has where the trace has them
-STATS_WORDS = (
-    "network",
-    "station",
-    "location",
-    "channel",
-    "delta",
-    "units",
-    "quantity",
-    "processing_level",
-    "coordinates",
-    "coordinates_source",
-    "coordinates_conflict",
-    "event",
-    "sensor_azimuth",
-    "sensor_dip",
-    "sensor_location",
-    "station_name",
-    "site_class",
-    "vs30",
-    "simulated",
-    "corners",
-    "digitised",
-    "per_obspy",
-    "processing",
-)
+_NUMBER = (int, float)
 
-#: words whose wrong type would stop the processing later -> their types
-_KINDS_OF_WORDS: dict[str, type | tuple[type, ...]] = {
-    "units": str,
-    "quantity": str,
-    "processing_level": str,
+#: words of ``trace.stats`` that a description has where the trace has them -> their types, where
+#: a wrong one would stop the processing later
+STATS_WORDS: dict[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("network", "station", "location", "channel", "delta"), object),
+    **dict.fromkeys(("units", "quantity", "processing_level"), str),
     "coordinates": AttribDict,
     "coordinates_source": str,
     "coordinates_conflict": str,
     "event": AttribDict,
+    **dict.fromkeys(("sensor_azimuth", "sensor_dip"), _NUMBER),
+    **dict.fromkeys(("sensor_location", "station_name"), object),
     "site_class": str,
-    "vs30": (int, float),
-    "sensor_azimuth": (int, float),
-    "sensor_dip": (int, float),
+    "vs30": _NUMBER,
+    "simulated": object,
     "corners": AttribDict,
+    "digitised": object,
     "per_obspy": AttribDict,
     "processing": list,
 }
@@ -86,9 +63,12 @@ def write_processed(stream: Stream, path: Path) -> dict[str, Any]:
     """
     with written_whole(path) as part, part.open("wb") as file:
         for trace in stream:
+            codes = {name: trace.stats[name][:length] for name, length in _LENGTHS.items()}
+            times = {"starttime": trace.stats.starttime, "delta": trace.stats.delta}
+            short = Trace(np.asarray(trace.data, dtype=np.float64), codes | times)
             # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
             content = BytesIO()
-            _with_short_codes(trace).write(content, format="MSEED", encoding="FLOAT64")
+            short.write(content, format="MSEED", encoding="FLOAT64")
             file.write(content.getbuffer())
     return {"traces": [_description(trace) for trace in stream]}
 
@@ -154,42 +134,35 @@ def described(stream: Stream, path: Path, content: bytes | None = None) -> Strea
     descriptions = read_descriptions(path, content)
     if descriptions is None:
         return stream
+    name = path.with_suffix(".json").name
     # Words are as this package wrote them, unless the file was edited
     try:
-        _require_same_lengths(stream, descriptions, path)
-        return _with_words(stream, descriptions)
-    except PerError:
-        raise
-    except Exception as error:
-        problem = f"{path.with_suffix('.json').name} is no description of records: {error!r}"
+        lengths = [words["npts"] for words in descriptions]
+        is_same = lengths == [trace.stats.npts for trace in stream]
+        out = stream.copy()
+        for trace, words in zip(out, descriptions if is_same else (), strict=is_same):
+            _add_words(trace, words)
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        problem = f"{name} is no description of records: {error!r}"
         raise RecordRejected(str(path), problem) from error
-
-
-def _with_words(stream: Stream, descriptions: list[dict[str, Any]]) -> Stream:
-    """Return traces with their words in groups, as the plugins of the formats give them."""
-    out = stream.copy()
-    for trace, words in zip(out, descriptions, strict=True):
-        known = {name: _group(words[name]) for name in STATS_WORDS if name in words}
-        trace.stats.update(known)
-        # ObsPy takes words of any type
-        for name, kind in _KINDS_OF_WORDS.items():
-            if name in known and not isinstance(known[name], kind):
-                raise TypeError(f"{name} is {known[name]!r}")
+    if not is_same:
+        raise RecordRejected(str(path), f"{name} describes other traces")
     return out
 
 
-def _require_same_lengths(stream: Stream, descriptions: list[dict[str, Any]], path: Path) -> None:
-    """Refuse descriptions of other traces."""
-    lengths = [description["npts"] for description in descriptions]
-    if lengths != [trace.stats.npts for trace in stream]:
-        raise RecordRejected(str(path), f"{path.with_suffix('.json').name} describes other traces")
-
-
-def _with_short_codes(trace: Trace) -> Trace:
-    """Return the samples under codes that MiniSEED can hold."""
-    codes = {name: trace.stats[name][:length] for name, length in _LENGTHS.items()}
-    times = {"starttime": trace.stats.starttime, "delta": trace.stats.delta}
-    return Trace(np.asarray(trace.data, dtype=np.float64), codes | times)
+def _add_words(trace: Trace, words: dict[str, Any]) -> None:
+    """Give a trace its words in groups, as the plugins of the formats do."""
+    known = {name: words[name] for name in STATS_WORDS if name in words}
+    # Groups are dictionaries of JSON, which has their times as texts
+    for name, word in known.items():
+        if isinstance(word, dict):
+            time = {"time": UTCDateTime(word["time"])} if "time" in word else {}
+            known[name] = AttribDict({**word, **time})
+    trace.stats.update(known)
+    # ObsPy takes words of any type
+    for name, word in known.items():
+        if not isinstance(word, STATS_WORDS[name]):
+            raise TypeError(f"{name} is {word!r}")
 
 
 def _description(trace: Trace) -> dict[str, Any]:
@@ -200,24 +173,12 @@ def _description(trace: Trace) -> dict[str, Any]:
         "start": str(trace.stats.starttime),
         "npts": trace.stats.npts,
     }
-    # Groups become plain dictionaries
+    # Groups become plain dictionaries, and times in them texts
     for name in STATS_WORDS:
+        word = trace.stats.get(name)
+        if isinstance(word, AttribDict):
+            times = {key: str(time) for key, time in word.items() if isinstance(time, UTCDateTime)}
+            word = {**word, **times}
         if name in trace.stats:
-            word = trace.stats[name]
-            description[name] = _plain(word) if isinstance(word, AttribDict) else word
+            description[name] = word
     return description
-
-
-def _plain(group: AttribDict) -> dict[str, Any]:
-    """Return a group of words as JSON can hold it: times as text."""
-    return {
-        name: str(word) if isinstance(word, UTCDateTime) else word for name, word in group.items()
-    }
-
-
-def _group(word: Any) -> Any:
-    """Return a dictionary of JSON as a group of words, its time as one; any other word as it is."""
-    if not isinstance(word, dict):
-        return word
-    time = {"time": UTCDateTime(word["time"])} if "time" in word else {}
-    return AttribDict({**word, **time})

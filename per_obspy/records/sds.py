@@ -9,9 +9,10 @@ import obspy
 from obspy import Inventory, Stream, UTCDateTime
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection, reason_of
-from per_obspy.records.archives.archive_files import read_file
-from per_obspy.records.contents.metadata_files import merged_inventory, read_inventories
+from per_obspy.records.archive import read_file
+from per_obspy.records.file_list import file_row
 from per_obspy.records.folder import SourceContents, read_station
+from per_obspy.records.metadata import merged_inventory, read_inventories
 from per_obspy.records.obspy_readers import read_content
 
 _DAY = 86400.0  # s
@@ -47,36 +48,34 @@ def find_sds_stations(
     folder = Path(archive)
     if not folder.is_dir():
         raise CatalogError(str(folder), "no such folder")
+    paths, unlisted = _day_files(folder, start, end)
     # The first two parts of a name are network and station
-    files: dict[str, list[Path]] = defaultdict(list)
-    paths, rejected = _day_files(folder, start, end)
+    files = defaultdict[str, list[Path]](list)
     for path in paths:
-        network, station = path.name.split(".")[:2]
-        files[f"{network}.{station}"].append(path)
+        files[".".join(path.name.split(".")[:2])].append(path)
     if not files:
         problem = f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}"
         raise CatalogError(str(folder), problem)
     # Metadata are outside the archive
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
-    stations = {name: tuple(paths) for name, paths in sorted(files.items())}
-    return SourceContents(stations, merged_inventory(inventories), tuple(rejected))
+    stations = {name: tuple(files[name]) for name in sorted(files)}
+    return SourceContents(stations, merged_inventory(inventories), unlisted)
 
 
 def _day_files(
     folder: Path, start: UTCDateTime, end: UTCDateTime
-) -> tuple[list[Path], list[Rejection]]:
+) -> tuple[list[Path], tuple[Rejection, ...]]:
     """Return the files of all days of a window and of the day before it, and unreadable folders."""
-    midnight = UTCDateTime(start.year, start.month, start.day)
-    last = int((end - midnight) // _DAY)
     files, unlisted = [], dict[Path, Rejection]()
     # Names end with year and day of the year
-    for number in range(-1, last + 1):
-        day = midnight + _DAY * number
+    day = UTCDateTime(start.year, start.month, start.day) - _DAY
+    while day <= end:
         paths = [folder / str(day.year)]
         for pattern in ("*", "*", "*.D", f"*.D.{day.year}.{day.julday:03d}"):
             paths = _listed(paths, pattern, unlisted)
         files += sorted(paths)
-    return files, list(unlisted.values())
+        day += _DAY
+    return files, tuple(unlisted.values())
 
 
 def _listed(folders: list[Path], pattern: str, unlisted: dict[Path, Rejection]) -> list[Path]:
@@ -89,7 +88,7 @@ def _listed(folders: list[Path], pattern: str, unlisted: dict[Path, Rejection]) 
             continue
         except OSError as error:
             reason = f"the folder cannot be listed: {reason_of(error)}"
-            unlisted[folder] = Rejection("file", folder.name, str(folder), None, (reason,))
+            unlisted[folder] = file_row(folder, reason)
     return paths
 
 
@@ -106,14 +105,10 @@ def read_sds_station(
     A day file that holds another channel or day than its name says is a rejection, and so is a
     station without samples in the window.
     """
-    usable, others = list[Path](), list[Rejection]()
     # Names of files are the index of an archive
-    for path in paths:
-        reason = _other_than_named(path)
-        if reason:
-            others.append(Rejection("file", path.name, str(path), None, (reason,)))
-        else:
-            usable.append(path)
+    reasons = {path: _other_than_named(path) for path in paths}
+    others = [file_row(path, reason) for path, reason in reasons.items() if reason]
+    usable = [path for path, reason in reasons.items() if not reason]
     stream, rejected = read_station(usable, inventory, station, start, end)
     if not stream and not rejected and not others:
         reason = f"no samples from {start} to {end}"

@@ -1,6 +1,5 @@
 """ShakeMap grids of the USGS: the ground motion of an earthquake on a map, from grid.xml."""
 
-import gzip
 import re
 import zlib
 from collections.abc import Iterable, Mapping
@@ -15,6 +14,7 @@ import xarray as xr
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, reason_of
+from per_obspy.records.archive import unpacked
 
 #: Fields of pseudo-spectral acceleration that a map must have; it may have others (PSA06: 0.6 s).
 REQUIRED = ("PSA03", "PSA10", "PSA30")
@@ -22,49 +22,43 @@ REQUIRED = ("PSA03", "PSA10", "PSA30")
 #: Most bytes of a grid, unpacked: ten times the largest that the USGS offers.
 LARGEST_FILE = 1_000_000_000
 
-#: Largest plausible acceleration (per cent of gravity), log-standard deviation and Vs30 (m/s).
-LARGEST_ACCELERATION, LARGEST_DEVIATION, LARGEST_VELOCITY = 2000.0, 3.0, 10_000.0
 
-#: Units as maps of several versions write them -> factor to SI.
-GRID_UNITS = {
-    "acceleration": {"pctg": STANDARD_GRAVITY / 100.0, "%g": STANDARD_GRAVITY / 100.0},
-    "deviation": {"ln(pctg)": 1.0, "ln(%g)": 1.0, "ln(g)": 1.0},
-    "velocity": {"ms": 1.0, "m/s": 1.0},
+class _Kind(NamedTuple):
+    """A kind of fields."""
+
+    units: dict[str, float]  # as maps of several versions write them -> factor to SI
+    largest: float  # plausible value, in the unit of the file
+    unit: str  # in SI
+
+
+_ACCELERATION = _Kind(dict.fromkeys(("pctg", "%g"), STANDARD_GRAVITY / 100.0), 2000.0, "m s-2")
+_DEVIATION = _Kind(dict.fromkeys(("ln(pctg)", "ln(%g)", "ln(g)"), 1.0), 3.0, "1")
+_VELOCITY = _Kind({"ms": 1.0, "m/s": 1.0}, 10_000.0, "m s-1")
+
+#: variable of a Dataset -> field of a map that may be absent, its kind and its meaning
+_OPTIONAL = {
+    "pga": ("PGA", _ACCELERATION, "peak ground acceleration"),
+    "vs30": ("SVEL", _VELOCITY, "Vs30 of the map"),
 }
+
+#: Attributes of the root element that name event and version of the map.
+_VERSION = ("event_id", "shakemap_version", "map_status", "shakemap_event_type")
 
 #: Characters from the beginning of a grid that hold the attributes of its map.
 _HEAD = 10_000
 
-_SPECTRAL, _MAP = ("period", "latitude", "longitude"), ("latitude", "longitude")
-
-#: Bytes that are read at once.
-PIECE = 2**20
+_AXES = ("latitude", "longitude")
 
 
 class _Grid(NamedTuple):
-    """
-    A grid file.
+    """A grid file."""
 
-    Attributes
-    ----------
-    source : str
-        Path, for messages.
-    attributes : dict
-        Of the root element.
-    longitude, latitude : (n,) ndarray
-        Degrees, rising.
-    columns : dict
-        Name of a field -> its values, (n_latitudes, n_longitudes), in the unit of the file.
-    units : dict
-        Name of a field -> its unit.
-    """
-
-    source: str
-    attributes: dict[str, str]
-    longitude: FloatArray
-    latitude: FloatArray
-    columns: dict[str, FloatArray]
-    units: dict[str, str]
+    source: str  # path, for messages
+    attributes: dict[str, str]  # path, and event and version of the map
+    longitude: FloatArray  # degrees, rising
+    latitude: FloatArray  # degrees, rising
+    fields: dict[str, FloatArray]  # name -> (n_latitudes, n_longitudes), in the unit of the file
+    units: dict[str, str]  # name -> unit
 
 
 def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
@@ -94,23 +88,24 @@ def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
         shape than its header has, or a value that is missing or implausible.
     """
     grid = _read(path)
-    names = _spectral(grid)
-    # Spectral acceleration, (n_periods, n_latitudes, n_longitudes)
-    psa = [_values(grid, name, "acceleration", LARGEST_ACCELERATION) for name in names]
+    if missing := [name for name in REQUIRED if name not in grid.fields]:
+        raise _no_field(grid, ", ".join(missing))
+    # By period: PSA03 is 0.3 s
+    names = sorted(name for name in grid.fields if re.fullmatch(r"PSA\d\d", name))
     meaning = "pseudo-spectral acceleration at 5 % damping"
-    variables = {"psa": _variable(_SPECTRAL, np.stack(psa), "m s-2", meaning)}
+    variables = {"psa": _variable(grid, names, _ACCELERATION, meaning)}
     # The deviation, from a separate file or from the grid
-    deviations = _read(uncertainty) if uncertainty else grid
-    if uncertainty or all(f"STD{name}" in grid.columns for name in names):
-        _require_same_axes(grid, deviations)
-        variables["psa_log_std"] = _log_std(deviations, names)
-    variables |= _peak_and_soil(grid)
+    if uncertainty or all(f"STD{name}" in grid.fields for name in names):
+        variables["psa_log_std"] = _log_std(grid, names, uncertainty)
+    for variable, (name, kind, meaning) in _OPTIONAL.items():
+        if name in grid.fields:
+            variables[variable] = _variable(grid, name, kind, meaning)
     axes = {
-        "period": [_period(name) for name in names],
+        "period": [int(name[-2:]) / 10.0 for name in names],
         "latitude": grid.latitude,
         "longitude": grid.longitude,
     }
-    return xr.Dataset(variables, coords=axes, attrs=_attributes(grid))
+    return xr.Dataset(variables, coords=axes, attrs=grid.attributes)
 
 
 def is_scenario(path: Path) -> bool:
@@ -170,146 +165,95 @@ def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> f
         return None
 
 
-def _variable(dimensions: tuple[str, ...], values: FloatArray, unit: str, meaning: str) -> Any:
-    """Return a variable of a Dataset."""
-    return dimensions, values, {"units": unit, "long_name": meaning}
+def _variable(grid: _Grid, names: str | list[str], kind: _Kind, meaning: str) -> Any:
+    """Return a field in SI as a variable of a Dataset, or the fields of all periods."""
+    attributes = {"units": kind.unit, "long_name": meaning}
+    if isinstance(names, str):
+        return _AXES, _values(grid, names, kind), attributes
+    return ("period", *_AXES), np.stack([_values(grid, name, kind) for name in names]), attributes
 
 
-def _log_std(grid: _Grid, names: list[str]) -> Any:
-    """Return the log-standard deviation of spectral acceleration."""
-    values = [_values(grid, f"STD{name}", "deviation", LARGEST_DEVIATION) for name in names]
-    return _variable(_SPECTRAL, np.stack(values), "1", "log-standard deviation of psa")
-
-
-def _peak_and_soil(grid: _Grid) -> dict[str, Any]:
-    """Return peak acceleration and Vs30, where the map has them."""
-    variables = {}
-    if "PGA" in grid.columns:
-        peak = _values(grid, "PGA", "acceleration", LARGEST_ACCELERATION)
-        variables["pga"] = _variable(_MAP, peak, "m s-2", "peak ground acceleration")
-    if "SVEL" in grid.columns:
-        velocity = _values(grid, "SVEL", "velocity", LARGEST_VELOCITY)
-        variables["vs30"] = _variable(_MAP, velocity, "m s-1", "Vs30 of the map")
-    return variables
-
-
-def _attributes(grid: _Grid) -> dict[str, str]:
-    """Return the path of a grid, and event and version of its map."""
-    known = ("event_id", "shakemap_version", "map_status", "shakemap_event_type")
-    return {
-        "source": grid.source,
-        **{name: grid.attributes[name] for name in known if name in grid.attributes},
-    }
-
-
-def _spectral(grid: _Grid) -> list[str]:
-    """Return the names of the fields of spectral acceleration, by rising period."""
-    if missing := [name for name in REQUIRED if name not in grid.columns]:
-        raise CatalogError(
-            grid.source, f"has no field {', '.join(missing)}, only {', '.join(grid.columns)}"
-        )
-    return sorted((name for name in grid.columns if re.fullmatch(r"PSA\d\d", name)), key=_period)
-
-
-def _period(name: str) -> float:
-    """Return the period of a field in s: PSA03 is 0.3 s."""
-    return int(name[-2:]) / 10.0
-
-
-def _values(grid: _Grid, name: str, kind: str, largest: float) -> FloatArray:
-    """
-    Return a field in SI.
-
-    It must be in a unit of its kind and between 0 and the largest plausible value.
-    """
-    if name not in grid.columns:
-        raise CatalogError(grid.source, f"has no field {name}, only {', '.join(grid.columns)}")
-    # Versions of maps differ in the spelling of units
-    unit, units = grid.units[name], GRID_UNITS[kind]
-    if unit not in units:
-        raise CatalogError(grid.source, f"{name} is in {unit!r}, not in one of {', '.join(units)}")
-    _require_plausible(grid, name, largest)
-    return grid.columns[name] * units[unit]
-
-
-def _require_plausible(grid: _Grid, name: str, largest: float) -> None:
-    """Refuse a field with a value that is no number, negative or implausibly large."""
-    values = grid.columns[name]
-    bad = ~((values >= 0.0) & (values <= largest))
-    if bad.any():
-        # Name the first of them with its place
-        row, column = np.unravel_index(int(np.argmax(bad)), bad.shape)
-        place = f"longitude {grid.longitude[column]:g}, latitude {grid.latitude[row]:g}"
-        value = f"{values[row, column]:g} {grid.units[name]}"
-        raise CatalogError(grid.source, f"{name} = {value} at {place}")
-
-
-def _require_same_axes(grid: _Grid, other: _Grid) -> None:
-    """Refuse an uncertainty on another grid than that of the map."""
+def _log_std(grid: _Grid, names: list[str], uncertainty: Path | None) -> Any:
+    """Return the log-standard deviation of spectral acceleration, on the grid of the map."""
+    other = _read(uncertainty) if uncertainty else grid
     for name in ("longitude", "latitude"):
         if not np.array_equal(getattr(grid, name), getattr(other, name)):
             raise CatalogError(other.source, f"its {name}s are not those of {grid.source}")
+    fields = [f"STD{name}" for name in names]
+    return _variable(other, fields, _DEVIATION, "log-standard deviation of psa")
+
+
+def _no_field(grid: _Grid, names: str) -> CatalogError:
+    """Return the error of a map without some fields."""
+    return CatalogError(grid.source, f"has no field {names}, only {', '.join(grid.fields)}")
+
+
+def _values(grid: _Grid, name: str, kind: _Kind) -> FloatArray:
+    """Return a field in SI; its unit must be one of its kind, all its values plausible."""
+    if name not in grid.fields:
+        raise _no_field(grid, name)
+    unit, values = grid.units[name], grid.fields[name]
+    # Versions of maps differ in the spelling of units
+    if unit not in kind.units:
+        problem = f"{name} is in {unit!r}, not in one of {', '.join(kind.units)}"
+        raise CatalogError(grid.source, problem)
+    # No number, negative or implausibly large: the first of them with its place
+    bad = ~((values >= 0.0) & (values <= kind.largest))
+    if bad.any():
+        row, column = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        place = f"longitude {grid.longitude[column]:g}, latitude {grid.latitude[row]:g}"
+        raise CatalogError(grid.source, f"{name} = {values[row, column]:g} {unit} at {place}")
+    return values * kind.units[unit]
 
 
 def _read(path: Path) -> _Grid:
     """Read a grid file."""
-    source = str(path)
-    root = _root(source, _text(path))
-    units = _field_units(source, root)
-    size = _size(source, root)
-    rows = _rows(source, root, len(units), size)
-    columns = dict(zip(units, rows.T, strict=True))
+    source, root = str(path), _root(path)
+    units, size = _units(source, root), _size(source, root)
+    fields = dict(zip(units, _rows(source, root, len(units), size).T, strict=True))
     # Every row has its node's coordinates
-    if missing := [name for name in ("LON", "LAT") if name not in columns]:
-        raise CatalogError(source, f"has no field {', '.join(missing)}, only {', '.join(columns)}")
-    columns["LON"] = _unbroken(columns["LON"])
+    if missing := [name for name in ("LON", "LAT") if name not in fields]:
+        raise CatalogError(source, f"has no field {', '.join(missing)}, only {', '.join(fields)}")
+    fields["LON"] = _unbroken(fields["LON"])
     # Rows from south to north, in each from west to east
-    order = np.lexsort((columns["LON"], columns["LAT"]))
-    shaped = {name: values[order].reshape(size) for name, values in columns.items()}
-    longitude, latitude = _axes(source, shaped["LON"], shaped["LAT"])
-    return _Grid(source, dict(root.attrib), longitude, latitude, shaped, units)
+    order = np.lexsort((fields["LON"], fields["LAT"]))
+    fields = {name: values[order].reshape(size) for name, values in fields.items()}
+    attributes = {name: root.attrib[name] for name in _VERSION if name in root.attrib}
+    axes = _axes(source, fields)
+    return _Grid(source, {"source": source, **attributes}, *axes, fields, units)
+
+
+def _root(path: Path) -> ElementTree.Element:
+    """Return the root element of a grid."""
+    try:
+        root = ElementTree.fromstring(_text(path))
+    except ElementTree.ParseError as error:
+        raise CatalogError(str(path), f"cannot be read as XML: {error}") from error
+    if (name := _name(root)) != "shakemap_grid":
+        problem = f"is no ShakeMap grid: its root is {name}, not shakemap_grid"
+        raise CatalogError(str(path), problem)
+    return root
 
 
 def _text(path: Path) -> str:
     """Return the content of a file, unpacked; a document type, with its entities, is refused."""
+
+    def check(total: int) -> None:
+        if total > LARGEST_FILE:
+            raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
+
     try:
-        content = _unpacked(path)
-        text = content.decode("utf-8")
+        with path.open("rb") as file:
+            head = file.read(2)  # of gzip alone
+            file.seek(0)
+            text = b"".join(unpacked(file, head, check)).decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     # Entities of a document type could fill the memory
-    if len(content) > LARGEST_FILE:
-        raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         problem = "contains a document type (DOCTYPE), which no ShakeMap has: refused"
         raise CatalogError(str(path), problem)
     return text
-
-
-def _unpacked(path: Path) -> bytes:
-    """Return the bytes of a file, unpacked if gzip packed it; few above the limit."""
-    with path.open("rb") as file:
-        packed = file.read(2) == b"\x1f\x8b"
-    pieces, size = [], 0
-    with gzip.open(path) if packed else path.open("rb") as file:
-        # Memory grows with the file, not with the limit
-        while size <= LARGEST_FILE and (piece := file.read(PIECE)):
-            pieces.append(piece)
-            size += len(piece)
-    return b"".join(pieces)
-
-
-def _root(source: str, text: str) -> ElementTree.Element:
-    """Return the root element of a grid."""
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise CatalogError(source, f"cannot be read as XML: {error}") from error
-    if _name(root) != "shakemap_grid":
-        raise CatalogError(
-            source, f"is no ShakeMap grid: its root is {_name(root)}, not shakemap_grid"
-        )
-    return root
 
 
 def _name(element: ElementTree.Element) -> str:
@@ -317,43 +261,39 @@ def _name(element: ElementTree.Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
-def _children(root: ElementTree.Element, name: str) -> Iterable[ElementTree.Element]:
-    return (element for element in root if _name(element) == name)
+def _children(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    """Return the elements of a name below the root."""
+    return [element for element in root if _name(element) == name]
 
 
-def _field_units(source: str, root: ElementTree.Element) -> dict[str, str]:
+def _units(source: str, root: ElementTree.Element) -> dict[str, str]:
     """Return the units of the fields, by name, in the order of their columns."""
     fields = [element.attrib for element in _children(root, "grid_field")]
     try:
-        numbered = sorted(
-            (int(field["index"]), field["name"], field.get("units", "")) for field in fields
-        )
+        numbered = sorted((int(one["index"]), one["name"], one.get("units", "")) for one in fields)
     except (KeyError, ValueError) as error:
         raise CatalogError(source, f"has a grid_field without index or name: {error}") from error
     # Columns are known by index only: none may be missing or repeated
     units = {name: unit for _, name, unit in numbered}
     if [index for index, _, _ in numbered] != list(range(1, len(units) + 1)):
-        raise CatalogError(
-            source, f"its grid_fields are not numbered 1, 2, 3, ...: {', '.join(units)}"
-        )
+        problem = f"its grid_fields are not numbered 1, 2, 3, ...: {', '.join(units)}"
+        raise CatalogError(source, problem)
     return units
 
 
 def _size(source: str, root: ElementTree.Element) -> tuple[int, int]:
-    """Return the numbers of latitudes and longitudes."""
-    specification = next(iter(_children(root, "grid_specification")), None)
-    numbers = {"nlat": "0", "nlon": "0"} if specification is None else specification.attrib
+    """Return the numbers of latitudes and longitudes; interpolation needs two of each."""
+    specification = [element.attrib for element in _children(root, "grid_specification")]
+    numbers = specification[0] if specification else {"nlat": "0", "nlon": "0"}
+    # Both must be there
     try:
         size = (int(numbers["nlat"]), int(numbers["nlon"]))
     except (KeyError, ValueError) as error:
-        raise CatalogError(
-            source, f"its grid_specification has no nlat and nlon: {error}"
-        ) from error
-    # Interpolation needs two nodes in each direction
+        problem = f"its grid_specification has no nlat and nlon: {error}"
+        raise CatalogError(source, problem) from error
     if min(size) < 2:
-        raise CatalogError(
-            source, f"needs two latitudes and two longitudes, has {size[0]} and {size[1]}"
-        )
+        problem = f"needs two latitudes and two longitudes, has {size[0]} and {size[1]}"
+        raise CatalogError(source, problem)
     return size
 
 
@@ -376,22 +316,6 @@ def _rows(
     return rows
 
 
-def _axes(
-    source: str, longitude: FloatArray, latitude: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the two axes of a table sorted by latitude, then longitude."""
-    _require_within(source, "LON", longitude, 540.0)
-    _require_within(source, "LAT", latitude, 90.0)
-    east, north = longitude[0], latitude[:, 0]
-    # All rows have the same longitudes, all columns the same latitudes
-    regular = (longitude == east).all() and (latitude == north[:, None]).all()
-    rising = (np.diff(east) > 0).all() and (np.diff(north) > 0).all()
-    # A whole turn would repeat a meridian
-    if not regular or not rising or east[-1] - east[0] >= 360.0:
-        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
-    return east, north
-
-
 def _unbroken(longitude: FloatArray) -> FloatArray:
     """Return longitudes in which those west of the widest hole go on beyond 180 or 360 degrees."""
     east = np.unique(longitude)
@@ -403,10 +327,19 @@ def _unbroken(longitude: FloatArray) -> FloatArray:
     return np.where(longitude <= east[hole], longitude + 360.0, longitude)
 
 
-def _require_within(source: str, name: str, degrees: FloatArray, limit: float) -> None:
-    """Refuse a coordinate beyond its limit, degrees."""
-    wrong = ~(np.abs(degrees) <= limit)
-    if wrong.any():
-        raise CatalogError(
-            source, f"{name} = {degrees[wrong][0]:g} is not between {-limit:g} and {limit:g}"
-        )
+def _axes(source: str, fields: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return longitudes and latitudes of a table sorted by latitude, then longitude, degrees."""
+    for name, limit in (("LON", 540.0), ("LAT", 90.0)):
+        wrong = fields[name][~(np.abs(fields[name]) <= limit)]
+        if wrong.size:
+            problem = f"{name} = {wrong[0]:g} is not between {-limit:g} and {limit:g}"
+            raise CatalogError(source, problem)
+    longitude, latitude = fields["LON"], fields["LAT"]
+    east, north = longitude[0], latitude[:, 0]
+    # All rows have the same longitudes, all columns the same latitudes
+    regular = (longitude == east).all() and (latitude == north[:, None]).all()
+    rising = (np.diff(east) > 0).all() and (np.diff(north) > 0).all()
+    # A whole turn would repeat a meridian
+    if not regular or not rising or east[-1] - east[0] >= 360.0:
+        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
+    return east, north

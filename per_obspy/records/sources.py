@@ -2,9 +2,9 @@
 
 import logging
 import os
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial, reduce
-from operator import add
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,8 +15,8 @@ from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
+from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.contents.input_files import hash_if_readable
 from per_obspy.records.earthquakes.choice import (
     OneEarthquake,
     Reader,
@@ -24,11 +24,12 @@ from per_obspy.records.earthquakes.choice import (
     one_earthquake,
     reader_of_event,
 )
-from per_obspy.records.earthquakes.groups import EventGroup, event_groups
+from per_obspy.records.earthquakes.groups import event_groups
 from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, find_stations, read_station
+from per_obspy.records.metadata import merged_inventory
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
 
@@ -111,43 +112,18 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     """
     # A wrong event stops the run here, not every station
     event = _event(records, fetched)
-    hashes = {event.path: event.hash} if event else {}
-    stations: dict[str, StationSource] = {}
-    rejected: list[Rejection] = []
-    expected = set[str]()
+    earthquake = event and event.event
+    folder = None
     # Of several earthquakes in the folder one is screened
-    folder = _folder(records, event and event.event)
-    for contents, reader in _contents(records, fetched, event and event.event, folder):
-        found = _with_usable_names(contents)
-        rejected += found.rejected
-        expected |= _expected(found)
-        hashes |= found.hashes
-        for name, paths in found.stations.items():
-            if name in stations:
-                rejected.append(_second_source(name, paths, stations[name].files))
-                continue
-            inventory = _selected(found.inventory, name)
-            stations[name] = StationSource(paths, _hashes(paths, hashes), inventory, reader)
-    earthquakes, waiting = _folder_facts(folder)
-    return Sources(
-        stations, event, tuple(rejected), hashes, earthquakes, frozenset(expected), waiting
-    )
-
-
-def _folder_facts(folder: OneEarthquake | None) -> tuple[list[dict[str, object]], tuple[Path, ...]]:
-    """Return the earthquakes of a folder, and its files that are still being written."""
-    return (folder.earthquakes, folder.contents[0][0].waiting) if folder else ([], ())
-
-
-def _expected(found: SourceContents) -> set[str]:
-    """Return the stations of the metadata and list of a source, with records or without."""
-    codes = [(network.code, place.code) for network in found.inventory or () for place in network]
-    listed = [
-        rejection.name
-        for rejection in found.rejected
-        if rejection.kind == "station" and rejection.source == FDSN
-    ]
-    return {f"{network}.{station}" for network, station in codes} | {*listed, *found.stations}
+    if records.folder:
+        limits = records.archives
+        found = find_stations(records.folder, records.stationxml, limits, records.settle)
+        folder = one_earthquake(found, records, earthquake)
+    sources = _served(_contents(records, fetched, earthquake, folder), event)
+    if folder is None:
+        return sources
+    waiting = folder.contents[0][0].waiting
+    return sources._replace(earthquakes=folder.earthquakes, waiting=waiting)
 
 
 def find_path_sources(paths: Sequence[Path]) -> Sources:
@@ -159,64 +135,86 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     CatalogError
         If a path is missing or holds no record.
     """
-    # Files of each station in all paths
-    found = [_with_usable_names(find_stations(path)) for path in paths]
-    files: dict[str, tuple[Path, ...]] = {}
-    hashes: dict[Path, str] = {}
-    for contents in found:
-        hashes |= contents.hashes
-        for name, station_files in contents.stations.items():
-            files[name] = (*files.get(name, ()), *station_files)
-
+    found = [find_stations(path) for path in paths]
     groups = event_groups([record for contents in found for record in contents.records])
-    _warn_of_several_earthquakes(groups)
-    reader = _path_reader(groups)
-
-    # Metadata in one of the paths serves stations of all
-    inventories = [contents.inventory for contents in found if contents.inventory]
-    inventory = reduce(add, inventories) if inventories else None
-    stations = {
-        name: StationSource(
-            station_files,
-            _hashes(station_files, hashes),
-            _selected(inventory, name),
-            reader,
-        )
-        for name, station_files in files.items()
-    }
-    rejected = [rejection for contents in found for rejection in contents.rejected]
-    return Sources(stations, None, tuple(rejected), hashes, [])
-
-
-def _with_usable_names(found: SourceContents) -> SourceContents:
-    """Return a source without the stations whose codes cannot name a file; each is a rejection."""
-    stations, rejected = {}, list(found.rejected)
-    # Codes become names of station files, records and figures
-    for name, paths in found.stations.items():
-        if problem := code_problem(*name.split(".", 1)):
-            source = ", ".join(sorted({str(path) for path in paths}))
-            rejected.append(Rejection("station", shortened(name, SHOWN), source, None, (problem,)))
-        else:
-            stations[name] = paths
-    return found._replace(stations=stations, rejected=tuple(rejected))
-
-
-def _path_reader(groups: Sequence[EventGroup]) -> Reader:
-    """Return the reader of stations; records of one earthquake have that of most headers."""
-    found = group_event(groups[0]) if len(groups) == 1 else None
-    return reader_of_event(partial(read_station), found)
-
-
-def _warn_of_several_earthquakes(groups: Sequence[EventGroup]) -> None:
-    """Log a warning where records of different earthquakes will be processed together."""
     if len(groups) > 1:
-        starts = ", ".join(group.label for group in groups)
         log.warning(
             "records of %d earthquakes are used together, they start %s: "
             "name the files of one of them",
             len(groups),
-            starts,
+            ", ".join(group.label for group in groups),
         )
+    # Records of one earthquake have that of most headers
+    agreed = group_event(groups[0]) if len(groups) == 1 else None
+    reader = reader_of_event(partial(read_station), agreed)
+    # Metadata in one of the paths serves stations of all
+    files = defaultdict[str, tuple[Path, ...]](tuple)
+    hashes: dict[Path, str] = {}
+    for contents in found:
+        hashes |= contents.hashes
+        for name, station_files in contents.stations.items():
+            files[name] += station_files
+    inventory = merged_inventory([contents.inventory for contents in found if contents.inventory])
+    rejected = tuple(row for contents in found for row in contents.rejected)
+    return _served([(SourceContents(files, inventory, rejected, hashes), reader)], None)
+
+
+def _served(contents: Iterable[tuple[SourceContents, Reader]], event: EventFile | None) -> Sources:
+    """Return each station of the first source that has it, with what all sources reject."""
+    sources = Sources({}, event, (), {event.path: event.hash} if event else {}, [])
+    rejected, expected = list[Rejection](), set[str]()
+    for found, reader in contents:
+        rejected += found.rejected
+        expected |= _expected(found)
+        sources.hashes.update(found.hashes)
+        # The first source that has a station serves it
+        for name, paths in found.stations.items():
+            reason = _unusable(name, paths, sources.stations.get(name))
+            if reason is not None:
+                rejected.append(reason)
+                continue
+            sources.stations[name] = _station(name, paths, found.inventory, reader, sources.hashes)
+    return sources._replace(rejected=tuple(rejected), expected=frozenset(expected))
+
+
+def _unusable(
+    name: str, paths: tuple[Path, ...], earlier: StationSource | None
+) -> Rejection | None:
+    """Return the row of a station that another source serves, or whose codes name no file."""
+    # Codes become names of station files, records and figures
+    if problem := code_problem(*name.split(".", 1)):
+        files = ", ".join(sorted({str(path) for path in paths}))
+        return Rejection("station", shortened(name, SHOWN), files, None, (problem,))
+    if earlier is None:
+        return None
+    reason = f"is also in {os.path.commonpath(earlier.files)}, which comes first"
+    return Rejection("station", name, os.path.commonpath(paths), None, (reason,))
+
+
+def _expected(found: SourceContents) -> set[str]:
+    """Return the stations of the metadata and list of a source, with records or without."""
+    listed = (row for row in found.rejected if row.kind == "station" and row.source == FDSN)
+    networks = found.inventory or ()
+    codes = {f"{network.code}.{place.code}" for network in networks for place in network}
+    # Names that can be those of files
+    usable = (name for name in found.stations if not code_problem(*name.split(".", 1)))
+    return codes.union(usable, (row.name for row in listed))
+
+
+def _station(
+    name: str,
+    paths: tuple[Path, ...],
+    inventory: Inventory | None,
+    reader: Reader,
+    hashes: dict[Path, str],
+) -> StationSource:
+    """Return a station with its metadata; each file is hashed once, for all of its stations."""
+    for path in paths:
+        if path not in hashes:
+            hashes[path] = hash_if_readable(path)
+    network, station = name.split(".", 1)
+    metadata = inventory and inventory.select(network=network, station=station)
+    return StationSource(paths, tuple(hashes[path] for path in paths), metadata, reader)
 
 
 def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None:
@@ -227,26 +225,6 @@ def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None
         return read_event_file(records.event)
     workspace = records.asdf.file if records.asdf else None
     return read_event_file(workspace) if workspace and has_event(workspace) else None
-
-
-def _selected(inventory: Inventory | None, name: str) -> Inventory | None:
-    """Return the metadata of one station."""
-    network, station = name.split(".", 1)
-    return inventory and inventory.select(network=network, station=station)
-
-
-def _second_source(name: str, paths: Iterable[Path], first: Iterable[Path]) -> Rejection:
-    """Return the rejection of a station that an earlier source has already."""
-    reason = f"is also in {os.path.commonpath(first)}, which comes first"
-    return Rejection("station", name, os.path.commonpath(paths), None, (reason,))
-
-
-def _hashes(paths: Iterable[Path], known: dict[Path, str]) -> tuple[str, ...]:
-    """Return the hashes of files; each file is read once, and its hash added to the known ones."""
-    for path in paths:
-        if path not in known:
-            known[path] = hash_if_readable(path)
-    return tuple(known[path] for path in paths)
 
 
 def _contents(
@@ -262,33 +240,18 @@ def _contents(
     if folder:
         yield from folder.contents
     if records.sds:
-        yield _sds(records, records.sds, event)
+        start, end = window(records.sds, event)
+        days = find_sds_stations(records.sds.folder, start, end, records.stationxml)
+        yield days, partial(read_sds_station, start=start, end=end)
     # Records processed by others and by services come last
     if records.asdf:
-        found = find_asdf_stations(records.asdf.file, records.asdf.tag)
-        yield found, partial(read_asdf_station, tag=records.asdf.tag)
+        workspace = find_asdf_stations(records.asdf.file, records.asdf.tag)
+        yield workspace, partial(read_asdf_station, tag=records.asdf.tag)
     if fetched:
         yield fetched_stations(fetched), partial(read_station)
 
 
-def _folder(records: config.Records, event: Event | None) -> OneEarthquake | None:
-    """Return the records of one earthquake in the folder, None if there is no folder."""
-    if not records.folder:
-        return None
-    found = find_stations(records.folder, records.stationxml, records.archives, records.settle)
-    return one_earthquake(found, records, event)
-
-
-def _sds(
-    records: config.Records, sds: config.Sds, event: Event | None
-) -> tuple[SourceContents, Reader]:
-    """Return the stations of an SDS archive in its window, and their reader."""
-    start, end = window(sds, event)
-    found = find_sds_stations(sds.folder, start, end, records.stationxml)
-    return found, partial(read_sds_station, start=start, end=end)
-
-
 def read_table(*_: object, table: config.Columns) -> tuple[Stream, tuple[Rejection, ...]]:
     """Read a plain table of samples; file, metadata and name are in its description."""
-    described = table.model_dump()
-    return read_columns(described.pop("file"), **described), ()
+    description = table.model_dump()
+    return read_columns(description.pop("file"), **description), ()

@@ -6,13 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from obspy import Stream, Trace
+from obspy import Trace
 
 from per_obspy.errors import Rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
 from per_obspy.records.earthquakes.choice import peak_motion
 from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
-from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.folder import find_stations, read_station, trace_row
 
 
 class RecordInfo(NamedTuple):
@@ -114,35 +114,22 @@ def describe_records(
     for name, paths in found.stations.items():
         stream, unread = reader(paths, found.inventory, name)
         rejected += unread
-        readable = [trace for trace in stream if trace.stats.npts]
-        records += [_described(trace, root) for trace in readable]
-        spans += [record_span(trace, Path(trace.stats.source)) for trace in readable]
-        rejected += _empty(stream)
-    # Times of all records show which are of one earthquake
-    return _with_events(records, spans), tuple(rejected)
+        rejected += [trace_row(one, "it has no samples") for one in stream if not one.stats.npts]
+        for trace in (one for one in stream if one.stats.npts):
+            records.append(_described(trace, root))
+            spans.append(record_span(trace, Path(trace.stats.source)))
+    # Times of all records show which are of one earthquake; a continuous one may hold several
+    rows = zip(records, _events(spans), strict=True)
+    return tuple(row._replace(event=event) for row, event in rows), tuple(rejected)
 
 
-def _with_events(
-    records: Sequence[RecordInfo], spans: Sequence[RecordSpan]
-) -> tuple[RecordInfo, ...]:
-    """Return the rows with number and start of the earthquakes that each belongs to."""
-    # A continuous record may hold several earthquakes
+def _events(spans: Sequence[RecordSpan]) -> list[str]:
+    """Return number and start of the earthquakes that each record belongs to."""
     numbers: dict[tuple[object, ...], list[str]] = defaultdict(list)
     for number, group in enumerate(event_groups(spans), start=1):
         for record in group.records:
             numbers[record.key].append(f"{number}: {group.label}")
-    rows = zip(records, spans, strict=True)
-    return tuple(row._replace(event=", ".join(numbers[span.key])) for row, span in rows)
-
-
-def _empty(stream: Stream) -> list[Rejection]:
-    """Return a rejection for every trace without samples."""
-    reason = ("it has no samples",)
-    return [
-        Rejection("record", trace.id, str(trace.stats.source), None, reason)
-        for trace in stream
-        if not trace.stats.npts
-    ]
+    return [", ".join(numbers[span.key]) for span in spans]
 
 
 def _described(trace: Trace, root: Path) -> RecordInfo:

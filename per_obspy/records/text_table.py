@@ -99,17 +99,17 @@ def read_columns(
         If a row has more or fewer values than the first one, lacks a column, holds no number or
         breaks the spacing; or if ``layout`` is not given and both layouts fit.
     """
-    # Check the settings that do not depend on the file
-    factor = _checked_unit(units)
-    _check_interval(time_column, dt)
-    _check_layout(layout, channels, time_column)
+    factor = _checked_factor(units, layout, channels, time_column, dt)
     site = _site(latitude, longitude)
     directions = _directions(channels, azimuths or {})
     # Read the samples and their interval
-    rows = _rows(path, separator, skip, layout)
-    _check_layout_is_clear(path, rows[0], layout, channels, time_column)
+    file = str(path)
+    rows = _rows(file, separator, skip, layout)
+    if layout is None and time_column is None and list(channels.values()) == [0]:
+        _require_one_value(file, *rows[0])
     if time_column is not None:
-        dt = _even_spacing(path, rows, _column(path, rows, time_column, "time"))
+        dt = _step(file, rows, time_column)
+    step = float(checks.positive("dt", dt or 0.0))
     common = {
         "network": network,
         "station": station,
@@ -119,51 +119,43 @@ def read_columns(
         "processing_level": "raw" if raw else "processed",
         "coordinates": site,
     }
-    step = checks.number("dt", 0.0 if dt is None else dt, checks.positive)
     # One trace per channel, in m/s2
     stream = Stream()
     for code, column in channels.items():
-        samples = factor * _column(path, rows, column, code)
+        samples = factor * _column(file, rows, column, code)
         stream.append(trace(samples, step, common | directions[code] | {"channel": code}))
     return stream
 
 
-def _check_layout(layout: str | None, channels: Mapping[str, int], time_column: int | None) -> None:
-    """Refuse a layout that is unknown or that channels and time do not fit."""
-    if layout is not None and layout not in TABLE_LAYOUTS:
+def _checked_factor(
+    units: str,
+    layout: str | None,
+    channels: Mapping[str, int],
+    time_column: int | None,
+    dt: float | None,
+) -> float:
+    """Return a unit of acceleration in m/s2; refuse an interval or a layout that does not fit."""
+    unit = motion_unit(units)
+    if unit is None or unit.quantity != "acceleration":
+        raise ValueError(f"units must be one of m/s2, cm/s2, gal, g, got {units!r}")
+    if (time_column is None) == (dt is None):
+        problem = f"exactly one of time_column and dt must be given, got {time_column} and {dt}"
+        raise ValueError(problem)
+    if layout not in (None, *TABLE_LAYOUTS):
         raise ValueError(f"layout must be one of {', '.join(TABLE_LAYOUTS)}, got {layout!r}")
     # Packed samples belong to one channel and have no times
     if layout == "rows" and time_column is not None:
         raise ValueError(f"layout = rows needs dt and no time_column, got column {time_column}")
     if layout == "rows" and list(channels.values()) != [0]:
         raise ValueError(f"layout = rows needs one channel, in column 0, got {dict(channels)}")
-
-
-def _checked_unit(units: str) -> float:
-    """Return an acceleration unit in m/s2."""
-    unit = motion_unit(units)
-    if unit is None or unit.quantity != "acceleration":
-        raise ValueError(f"units must be one of m/s2, cm/s2, gal, g, got {units!r}")
     return unit.factor
-
-
-def _check_interval(time_column: int | None, dt: float | None) -> None:
-    """Refuse an interval that is set twice or not at all."""
-    if (time_column is None) == (dt is None):
-        raise ValueError(
-            f"exactly one of time_column and dt must be given, got {time_column} and {dt}"
-        )
 
 
 def _site(latitude: float, longitude: float) -> dict[str, float | None]:
     """Return the coordinates of a station, checked, degrees."""
     return coordinates(
-        checks.number(
-            "latitude", latitude, lambda name, value: checks.between(name, value, -90, 90)
-        ),
-        checks.number(
-            "longitude", longitude, lambda name, value: checks.between(name, value, -180, 180)
-        ),
+        float(checks.between("latitude", latitude, -90, 90)),
+        float(checks.between("longitude", longitude, -180, 180)),
     )
 
 
@@ -186,12 +178,12 @@ def _directions(
     return directions
 
 
-def _rows(path: str | Path, separator: str | None, skip: int, layout: str | None) -> list[_Row]:
+def _rows(path: str, separator: str | None, skip: int, layout: str | None) -> list[_Row]:
     """Return the fields of every line with samples; of packed samples one row per sample."""
     try:
         content = Path(path).read_text(encoding="latin-1")
     except OSError as error:
-        raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
+        raise CatalogError(path, f"cannot be read: {error.strerror}") from error
     lines = [line.split("#")[0] for line in content.rstrip().splitlines()]
     # Lines are numbered from 1, the skipped ones included
     numbered = enumerate(lines[skip:], skip + 1)
@@ -201,63 +193,60 @@ def _rows(path: str | Path, separator: str | None, skip: int, layout: str | None
     if layout == "rows":
         rows = [(number, [field]) for number, fields in rows for field in fields]
     if len(rows) < 2:
-        raise RecordRejected(
-            str(path), f"{len(rows)} rows of samples after {skip} lines, a record needs two"
-        )
+        problem = f"{len(rows)} rows of samples after {skip} lines, a record needs two"
+        raise RecordRejected(path, problem)
     return rows
 
 
-def _refuse_unequal_rows(path: str | Path, rows: Sequence[_Row], layout: str | None) -> None:
+def _refuse_unequal_rows(path: str, rows: Sequence[_Row], layout: str | None) -> None:
     """Refuse the first row whose number of values is not that of the first row."""
-    for index, (line, fields) in enumerate(rows):
-        expected = len(rows[0][1])
-        is_last_of_packed = layout == "rows" and index == len(rows) - 1
-        if len(fields) == expected or (is_last_of_packed and len(fields) < expected):
-            continue
-        # Samples that are packed into rows look like a table with a short last row
-        problem = f"{len(fields)} values, expected {expected} as on line {rows[0][0]}"
-        if layout != "rows":
-            problem += '; if the samples are packed into rows, set layout = "rows"'
-        raise RecordRejected(str(path), f"line {line}: {problem}")
+    expected = len(rows[0][1]) if rows else 0
+    # The last row of packed samples may be shorter
+    is_shorter = layout == "rows" and rows and len(rows[-1][1]) < expected
+    for line, fields in rows[:-1] if is_shorter else rows:
+        if len(fields) != expected:
+            problem = f"{len(fields)} values, expected {expected} as on line {rows[0][0]}"
+            # Samples that are packed into rows look like a table with a short last row
+            if layout != "rows":
+                problem += '; if the samples are packed into rows, set layout = "rows"'
+            raise RecordRejected(path, f"line {line}: {problem}")
 
 
-def _check_layout_is_clear(
-    path: str | Path,
-    row: _Row,
-    layout: str | None,
-    channels: Mapping[str, int],
-    time_column: int | None,
-) -> None:
+def _require_one_value(path: str, line: int, fields: Sequence[str]) -> None:
     """Refuse several values per row of a single channel, which may be packed samples or not."""
-    line, fields = row
-    both_fit = layout is None and time_column is None and list(channels.values()) == [0]
-    if both_fit and len(fields) > 1:
+    if len(fields) > 1:
         problem = f"{len(fields)} values per row for one channel without a column of time"
         mend = 'set layout = "rows" for packed samples, "columns" to read the first value alone'
-        raise RecordRejected(str(path), f"line {line}: {problem}; {mend}")
+        raise RecordRejected(path, f"line {line}: {problem}; {mend}")
 
 
-def _column(path: str | Path, rows: Sequence[_Row], column: int, name: str) -> FloatArray:
+def _column(path: str, rows: Sequence[_Row], column: int, name: str) -> FloatArray:
     """Return the numbers of a column, which must be finite."""
-    values = np.empty(len(rows))
-    for index, (line, fields) in enumerate(rows):
-        if not 0 <= column < len(fields):
-            problem = f"no column {column}, there are {len(fields)}"
-            raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
-        # Text and words too long for a number are refused as numbers that are not finite are
-        word = fields[column].strip()
-        try:
-            values[index] = float(word) if len(word) <= LONGEST_NUMBER else np.nan
-        except ValueError:
-            values[index] = np.nan
-        if not np.isfinite(values[index]):
-            problem = f"{word[:LONGEST_NUMBER]!r} is not a finite number"
-            raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
+    line, fields = rows[0]
+    if not 0 <= column < len(fields):
+        problem = f"no column {column}, there are {len(fields)}"
+        raise RecordRejected(path, f"line {line}, {name}: {problem}")
+    values = np.array([_number(fields[column].strip()) for _, fields in rows])
+    finite = np.isfinite(values)
+    # Name the first that is none
+    if not finite.all():
+        line, fields = rows[int(np.argmin(finite))]
+        problem = f"{fields[column].strip()[:LONGEST_NUMBER]!r} is not a finite number"
+        raise RecordRejected(path, f"line {line}, {name}: {problem}")
     return values
 
 
-def _even_spacing(path: str | Path, rows: Sequence[_Row], times: FloatArray) -> float:
+def _number(word: str) -> float:
+    """Return a number; not a number for text and words too long for one."""
+    try:
+        return float(word) if len(word) <= LONGEST_NUMBER else np.nan
+    except ValueError:
+        return np.nan
+
+
+def _step(path: str, rows: Sequence[_Row], column: int) -> float:
     """Return the mean interval of times that must be evenly spaced, s."""
+    times = _column(path, rows, column, "time")
     dt = float(times[-1] - times[0]) / (len(times) - 1)
     uneven = np.abs(np.diff(times) - dt) > _UNEVENNESS * abs(dt)
     if dt <= 0 or uneven.any():
@@ -265,5 +254,5 @@ def _even_spacing(path: str | Path, rows: Sequence[_Row], times: FloatArray) -> 
         first = int(np.argmax(uneven))
         step = f"{times[first]:g} s is followed by {times[first + 1]:g} s"
         problem = f"{step}, the mean interval is {dt:g} s"
-        raise RecordRejected(str(path), f"line {rows[first + 1][0]}, time: {problem}")
+        raise RecordRejected(path, f"line {rows[first + 1][0]}, time: {problem}")
     return float(f"{dt:.9g}")  # times are rounded, so more digits would be noise

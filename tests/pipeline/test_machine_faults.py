@@ -16,7 +16,7 @@ import pytest
 from per_obspy.errors import Unfinished
 from per_obspy.jobs import chunk, ground_files, station
 from per_obspy.pipeline.run import run
-from per_obspy.records.archives import archive_files
+from per_obspy.records import archive
 
 from .small_run import InProcess, write_configuration, write_smallest_configuration
 
@@ -48,7 +48,7 @@ def no_memory(*_, **__):
 
 #: What fails, and how: at a record, a station file, a chunk, and when a chunk reads a station file.
 FAULTS = {
-    "record not opened": (archive_files, "_archive_of", system_error(errno.EMFILE)),
+    "record not opened": (archive, "_archive_of", system_error(errno.EMFILE)),
     "shard not read back": (station, "_read_shard", system_error(errno.EIO)),
     "part not written": (chunk, "write_part", system_error(errno.EIO)),
     "memory for pairs": (chunk, "risk_rows", no_memory),

@@ -1,24 +1,26 @@
-"""Folders of records with StationXML."""
+"""Folders of records with StationXML, that grow, and with several forms of a record."""
 
 import errno
 import os
 import re
 import socket
+import time
 from pathlib import Path
 
 import numpy as np
 import obspy
 import pytest
-from obspy import Stream, Trace
-from obspy.core.event import Catalog, Event, Origin
+from obspy import Stream, Trace, UTCDateTime
 from station_files import START, read_all, record, write_records
 
 from per_obspy.config import Processing
-from per_obspy.errors import CatalogError, NothingUsable
+from per_obspy.errors import CatalogError, NothingUsable, TryLater
 from per_obspy.formats.peer_at2 import write_at2
 from per_obspy.processing.chain import process_station
+from per_obspy.records import file_list
 from per_obspy.records.event_file import read_event
-from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.file_list import changed_files, file_states, growing_files
+from per_obspy.records.folder import find_stations, one_series, read_station
 
 
 @pytest.fixture
@@ -182,32 +184,6 @@ def test_a_named_stationxml_must_be_readable(folder: Path):
         find_stations(folder, folder / "notes.txt")
     with pytest.raises(CatalogError, match="holds no StationXML"):
         find_stations(folder, folder / "deep")
-
-
-def test_the_event_of_a_quakeml_file(tmp_path: Path):
-    event = Event(origins=[Origin(time=START, latitude=35, longitude=-117, depth=8000)])
-    Catalog([event]).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    assert read_event(tmp_path / "event.xml").origins[0].time == START
-
-
-@pytest.mark.parametrize(
-    ("events", "message"),
-    [
-        ([], r"event\.xml: must hold one event, holds 0"),
-        ([Event(), Event()], r"event\.xml: must hold one event, holds 2"),
-        ([Event()], "has no origin"),
-        ([Event(origins=[Origin(latitude=35, longitude=-117)])], "has an origin without time"),
-    ],
-)
-def test_other_quakeml_files_are_refused(tmp_path: Path, events: list[Event], message: str):
-    Catalog(events).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    with pytest.raises(CatalogError, match=message):
-        read_event(tmp_path / "event.xml")
-
-
-def test_a_missing_event_is_named(tmp_path: Path):
-    with pytest.raises(CatalogError, match=r"missing\.xml"):
-        read_event(tmp_path / "missing.xml")
 
 
 @pytest.mark.real_data
@@ -418,3 +394,122 @@ def test_inputs_that_gave_wrong_numbers_in_the_field(
     found = {trace.stats.channel: float(np.abs(trace.data).max()) for trace in best}
     assert found == pytest.approx(peaks, rel=2e-4)
     assert len(rejected) == 3 - len(peaks)
+
+
+def form(
+    source: str, units: str = "m/s2", kind: str = "COSMOS", seconds: int = 60, **stats: object
+) -> Trace:
+    header = {"network": "CE", "station": "1", "channel": "HNN", "delta": 0.01, "starttime": START}
+    header |= {"units": units, "_format": kind, "source": source, "processing_level": "raw"}
+    return Trace(np.ones(100 * seconds), header | stats)
+
+
+def kept(*traces: Trace) -> list[str]:
+    stream, rejected = one_series(Stream(list(traces)))
+    assert len(stream) + len(rejected) == len(traces)
+    return [trace.stats.source for trace in stream]
+
+
+def test_acceleration_goes_before_counts():
+    counts, physical = form("a.V0", "counts"), form("a.V1")
+    assert kept(counts, physical) == kept(physical, counts) == ["a.V1"]
+    _, (row,) = one_series(Stream([counts, physical]))
+    assert (row.kind, row.name, row.source) == ("record", "CE.1..HNN", "a.V0")
+    assert row.reasons == ("the same record as a.V1 (COSMOS in m/s2), which is read instead",)
+
+
+def test_the_longer_form_goes_first():
+    assert kept(form("a.smc", kind="SMC", seconds=40), form("a.V0", "counts")) == ["a.V0"]
+
+
+def test_of_equal_forms_the_choice_does_not_depend_on_the_order():
+    one, two = form("b.raw", kind="CSMIP_V1"), form("a.smc", kind="SMC")
+    assert kept(one, two) == kept(two, one) == ["b.raw"]
+
+
+@pytest.mark.parametrize(
+    "stats",
+    [
+        {"starttime": START + 3600},
+        {"channel": "HNE"},
+        {"location": "01"},
+        {"station": "2"},
+        {"processing_level": "processed"},
+    ],
+)
+def test_another_time_channel_or_state_is_another_record(stats: dict[str, object]):
+    assert kept(form("a.V1"), form("b.smc", kind="SMC", **stats)) == ["a.V1", "b.smc"]
+
+
+def test_pieces_of_one_form_all_stay():
+    later = form("b.V1", starttime=START + 50)
+    assert kept(form("a.V1"), later, form("a.V0", "counts")) == ["a.V1", "b.V1"]
+
+
+OLD = time.time() - 3600
+
+
+def write_record(folder, station, changed=OLD):
+    """Write a record as MiniSEED with a time of its latest change."""
+    header = {"network": "XX", "station": station, "channel": "HNZ", "sampling_rate": 100.0}
+    trace = Trace(np.arange(2000, dtype=np.int32), {**header, "starttime": UTCDateTime(2024, 1, 1)})
+    path = folder / f"{station}.mseed"
+    Stream([trace]).write(str(path), format="MSEED")
+    os.utime(path, (changed, changed))
+    return path
+
+
+def test_a_young_file_waits_and_is_taken_later(tmp_path):
+    write_record(tmp_path, "A")
+    half = write_record(tmp_path, "B", changed=time.time())
+    half.write_bytes(half.read_bytes()[:300])  # would be a rejected file
+    found = find_stations(tmp_path, settle=60.0)
+    assert (list(found.stations), found.waiting, found.rejected) == (["XX.A"], (half,), ())
+    # without the setting every file is read
+    assert find_stations(tmp_path).waiting == ()
+    write_record(tmp_path, "B")
+    assert list(find_stations(tmp_path, settle=60.0).stations) == ["XX.A", "XX.B"]
+
+
+def test_a_folder_of_young_files_is_read_later(tmp_path):
+    write_record(tmp_path, "A", changed=time.time())
+    with pytest.raises(TryLater, match="its 1 files are still being written, try again in 60 s"):
+        find_stations(tmp_path, settle=60.0)
+
+
+def test_a_file_that_changes_meanwhile_waits(tmp_path, monkeypatch):
+    # a clock of the file server that is ahead, and a writer that goes on
+    path = write_record(tmp_path, "A", changed=time.time() + 3600)
+    states = file_states([path])
+    monkeypatch.setattr(file_list.time, "sleep", lambda _: path.write_bytes(b"more"))
+    assert growing_files(states, 60.0) == {path}
+    # the same clock, but a writer that has finished
+    path = write_record(tmp_path, "B", changed=time.time() + 3600)
+    monkeypatch.setattr(file_list.time, "sleep", lambda _: None)
+    assert growing_files(file_states([path]), 60.0) == set()
+
+
+def test_a_file_that_changes_while_it_is_read_waits(tmp_path, monkeypatch):
+    write_record(tmp_path, "A")
+    path = write_record(tmp_path, "B")
+    from per_obspy.records import folder
+
+    read = folder.read_file
+
+    def reading(file, limits):
+        content = read(file, limits)
+        if file == path:
+            file.write_bytes(content + content)
+        return content
+
+    monkeypatch.setattr(folder, "read_file", reading)
+    found = find_stations(tmp_path, settle=60.0)
+    assert (list(found.stations), found.waiting) == (["XX.A"], (path,))
+
+
+def test_a_file_that_vanishes_has_changed(tmp_path):
+    path = write_record(tmp_path, "A")
+    states = file_states([path, tmp_path / "absent"])
+    assert list(states) == [path]
+    path.unlink()
+    assert changed_files(states) == {path}

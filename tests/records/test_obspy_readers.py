@@ -20,9 +20,9 @@ from station_files import record
 from per_obspy.errors import RecordRejected
 from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
-from per_obspy.records.contents.metadata_files import read_inventories
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import find_stations
+from per_obspy.records.metadata import read_inventories
 from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy
 from per_obspy.records.summary import describe_records
 
@@ -262,7 +262,7 @@ def test_a_reader_that_fails_loses_its_file_only(tmp_path: Path, monkeypatch, pr
     gcf = Path(obspy.__file__).parent / "io/gcf/tests/data/20160603_1910n.gcf"
     (tmp_path / "a.gcf").write_bytes(gcf.read_bytes())
     record("HN1").write(str(tmp_path / "b.mseed"), format="MSEED")
-    monkeypatch.setattr(obspy_readers, "_limits", lambda _: Limits(1.0, 64 << 20))
+    monkeypatch.setattr(obspy_readers, "Limits", lambda *_: Limits(1.0, 64 << 20))
     call = obspy_readers.read_apart
     monkeypatch.setattr(obspy_readers, "read_apart", lambda limits, *_: call(limits, exec, program))
     contents = find_stations(tmp_path)

@@ -1,7 +1,7 @@
 """
 Every source of a configuration under one contract.
 
-Covers per_obspy.records.contents.input_files too: the files on which a result depends.
+Covers per_obspy.records.file_list too: the files on which a result depends.
 """
 
 import re
@@ -17,8 +17,8 @@ from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
-from per_obspy.records.contents.input_files import input_files
 from per_obspy.records.event_file import read_event
+from per_obspy.records.file_list import input_files
 from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.sources import find_path_sources, find_sources

@@ -17,7 +17,7 @@ coordinates
     latitude, longitude (degrees), elevation (m).
 coordinates_source, coordinates_conflict
     Name of the table of stations, ``"header"`` or ``"StationXML"``; text with the places of other
-    sources that are more than 1 km away (``records/coordinate_sources.py``).
+    sources that are more than 1 km away (``records/metadata.py``).
 sensor_location
     Place in the structure or the ground, as the header has it.
 sensor_azimuth, sensor_dip

@@ -28,9 +28,8 @@ from per_obspy.operation.events.revisions import (
 )
 from per_obspy.operation.events.state import EventState, changed, event_folder, iso
 from per_obspy.pipeline.run import run
-from per_obspy.records.contents.file_list import files_below
-from per_obspy.records.contents.growing import file_states, growing_files
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations
+from per_obspy.records.file_list import file_states, files_below, growing_files
 from per_obspy.tables.ranked_table import table_outputs
 
 

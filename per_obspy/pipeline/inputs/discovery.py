@@ -116,7 +116,7 @@ def write_first_configuration(
 
 def _is_bundle(path: Path) -> bool:
     """Return whether a file holds many records: an archive or a workspace."""
-    from per_obspy.records.archives.walked import is_archive
+    from per_obspy.records.archive import is_archive
     from per_obspy.records.asdf import is_asdf
 
     return is_archive(path) or is_asdf(path)

@@ -13,7 +13,7 @@ from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
-from per_obspy.records.archives.archive_files import LIMITS
+from per_obspy.records.archive import LIMITS
 from per_obspy.records.earthquakes.groups import (
     GAP,
     HOURS,

@@ -3,7 +3,7 @@ Bundles of strong-motion centres as they are downloaded.
 
 No real bundle is at hand: these are made of the documented parts (a zip of zips, one per station or
 record, with documents) from real records of the formats. They test
-per_obspy.records.contents.file_list and per_obspy.records.contents.metadata_files with archives.
+per_obspy.records.file_list and per_obspy.records.metadata with archives.
 """
 
 import io

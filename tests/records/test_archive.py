@@ -1,9 +1,4 @@
-"""
-Archives made to exhaust memory or time, or to lead elsewhere.
-
-They are read by per_obspy.records.archives.packed, per_obspy.records.archives.walked,
-per_obspy.records.archives.zip_archive and per_obspy.records.archives.tar_archive.
-"""
+"""Archives of records, whole, damaged, or made to exhaust memory or time or to lead elsewhere."""
 
 import gzip
 import io
@@ -15,16 +10,114 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import pytest
-from archive_samples import AT2, mseed
+from obspy import Stream, Trace
 
 from per_obspy.config import Archives, Records
-from per_obspy.errors import RecordRejected
-from per_obspy.records.archives.archive_files import archive_files, open_file
-from per_obspy.records.archives.tar_archive import PackedTar
-from per_obspy.records.archives.zip_archive import PackedZip
-from per_obspy.records.folder import find_stations
+from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.records.archive import Archive, archive_files, open_file
+from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.sources import find_sources
+
+AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
+Some Event, 7/21/1952, Some School, 21
+ACCELERATION TIME SERIES IN UNITS OF G
+NPTS=      3, DT=   .0100 SEC,
+  .1E+00 .2E+00 -.3E+00
+"""
+
+
+def mseed(station: str) -> bytes:
+    file = io.BytesIO()
+    header = {"network": "CI", "station": station, "channel": "HNN", "delta": 0.01}
+    Stream([Trace(np.arange(300, dtype=np.int32), header)]).write(file, format="MSEED")
+    return file.getvalue()
+
+
+CONTENT = {
+    "deep/one.mseed": mseed("ONE"),
+    "two.mseed": mseed("TWO"),
+    "three.AT2": AT2,
+    "notes.txt": b"words",
+}
+
+
+def pack(path: Path) -> Path:
+    if path.suffix == ".zip":
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in CONTENT.items():
+                archive.writestr(name, content)
+        return path
+    mode = {".tar": "w", ".gz": "w:gz", ".tgz": "w:gz", ".bz2": "w:bz2", ".xz": "w:xz"}[path.suffix]
+    # the mode is one of those in tarfile's documentation
+    with tarfile.open(path, mode) as archive:  # type: ignore[call-overload]
+        for name, content in CONTENT.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    return path
+
+
+every = pytest.mark.parametrize(
+    "name", ["a.zip", "a.tar", "a.tar.gz", "a.tgz", "a.tar.bz2", "a.tar.xz", "A.ZIP.zip"]
+)
+
+
+@every
+def test_an_archive_is_a_folder(tmp_path: Path, name: str):
+    archive = pack(tmp_path / name)
+    contents = find_stations(tmp_path)
+    assert contents.stations["CI.ONE"] == (archive / "deep" / "one.mseed",)
+    assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
+    assert [rejection.name for rejection in contents.rejected] == ["notes.txt"]
+    assert open_file(archive / "three.AT2").read() == AT2
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # no file is unpacked on disk
+
+
+@every
+def test_records_in_archives_are_the_same_as_outside(tmp_path: Path, name: str):
+    archive = pack(tmp_path / name)
+    (tmp_path / "three.AT2").write_bytes(AT2)
+    paths = [archive / "three.AT2", tmp_path / "three.AT2"]
+    for path in paths:
+        (trace,), rejected = read_station([path], None)
+        assert rejected == ()
+        assert trace.stats.source == str(path)
+        assert "coordinates" not in trace.stats  # the AT2 format has none, and none are made up
+
+
+@every
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
+def test_a_damaged_archive_is_a_rejection(tmp_path: Path, name: str, part: float):
+    archive = pack(tmp_path / name)
+    content = archive.read_bytes()
+    archive.write_bytes(content[: int(part * len(content))])
+    (tmp_path / "three.AT2").write_bytes(AT2)
+    contents = find_stations(tmp_path)
+    assert next(iter(contents.stations)) == ".SOMESCHOOL"
+    assert contents.rejected
+
+
+def test_a_folder_of_damaged_archives_is_refused(tmp_path: Path):
+    (tmp_path / "a.zip").write_bytes(b"no archive")
+    with pytest.raises(CatalogError, match=r"a\.zip: the archive is damaged"):
+        find_stations(tmp_path)
+
+
+def test_missing_members_are_refused(tmp_path: Path):
+    archive = pack(tmp_path / "a.zip")
+    with pytest.raises(RecordRejected, match="cannot be read"):
+        open_file(archive / "none.AT2")
+
+
+def test_damaged_members_are_refused(tmp_path: Path):
+    archive = pack(tmp_path / "a.zip")
+    archive.write_bytes(archive.read_bytes().replace(b"NPTS", b"MPTS"))
+    assert len(archive_files(archive)[0]) == len(CONTENT)
+    with pytest.raises(RecordRejected, match="Bad CRC-32"):
+        open_file(archive / "three.AT2")
+
 
 MANY = 50_000
 
@@ -387,16 +480,15 @@ def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name, write, 
     archive = write(tmp_path / name, many)
     # every opening of the archive and every member that is described
     opened, described = [], []
-    for kind in (PackedZip, PackedTar):
-        walk = kind.described
+    listed = Archive.listed
 
-        def counted(self, walk=walk, kind=kind):
-            opened.append(kind)
-            for member in walk(self):
-                described.append(member)
-                yield member
+    def counted(self):
+        opened.append(self)
+        for member in listed(self):
+            described.append(member)
+            yield member
 
-        monkeypatch.setattr(kind, "described", counted)
+    monkeypatch.setattr(Archive, "listed", counted)
     files, rejected = archive_files(archive)
     assert (len(files), rejected) == (many, [])
     # members of all parts, the last first

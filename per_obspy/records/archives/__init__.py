@@ -1,1 +1,0 @@
-"""Archives as folders: zip and tar, also inside each other."""

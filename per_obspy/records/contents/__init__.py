@@ -1,1 +1,0 @@
-"""Contents of a folder of records: its files, their metadata, one series of each channel."""
