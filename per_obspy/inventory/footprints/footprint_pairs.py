@@ -58,7 +58,7 @@ def pairs_from_footprints(
         GeoPackage, GeoJSON, Shapefile, FlatGeobuf or GeoParquet of polygons with heights or
         storeys, or a CSV list of buildings with outlines as WKT or with longitude, latitude, width,
         length and azimuth. Known column names are in
-        ``per_obspy.inventory.importers``; lengths may have units (``6 m``, ``20 ft``).
+        ``per_obspy/inventory/footprints/sources.toml``; lengths may have units (``6 m``, ``20 ft``).
     distance : float, optional
         Largest gap of a pair, m.
     layer : str, optional

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.footprints.layers import Geometries
+from per_obspy.inventory.footprints.raw_layer import Geometries
 
 IntArray = NDArray[np.int64]
 
