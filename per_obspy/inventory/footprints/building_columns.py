@@ -118,28 +118,33 @@ def schema_columns(
     """
     source = source_of(map(str, attributes.columns))
     cells = converted(attributes, source)
-    columns = {name: cells[own] for name, own in source.columns.items() if own in cells}
-    table = pd.DataFrame(columns | dict(given or {}), index=cells.index)
+    table = _named_columns(cells, source, given or {})
     notes, placeholders = _read_sizes(table)
-    is_empty = len(table) > 0 and _has_no_size(table).all() and not any(notes)
+    is_understood = np.array(notes, dtype=object) == ""
+    is_empty = len(table) > 0 and (_has_no_size(table) & is_understood).all()
     if is_empty or not set(SIZES) & set(table):
         raise CatalogError(file, _no_size(table, attributes, source))
-    # Names of systems and buildings
-    if "system" not in table and (systems := _systems(cells, source)) is not None:
-        table["system"] = systems
-    table["building_id"] = _identifiers(table)
     # Missing heights from the classes of the layer
     if source.class_column is not None:
         classes = cells.get(source.class_column, pd.Series("", cells.index))
-        is_understood = np.array([note == "" for note in notes], dtype=bool)
         table = with_class_heights(table, classes, is_understood)
     # A placeholder of a building without any size is a note
-    lost = set(np.flatnonzero(_has_no_size(table)).tolist())
-    for row in placeholders.keys() & lost:
-        notes[row] = notes[row] or placeholders[row]
+    for row in np.flatnonzero(_has_no_size(table) & is_understood).tolist():
+        notes[row] = placeholders.get(row, "")
     if any(notes):
         table[NOTES] = notes
     return table.join(cells[[name for name in source.carried if name in cells]])
+
+
+def _named_columns(
+    cells: pd.DataFrame, source: Source, given: Mapping[str, pd.Series]
+) -> pd.DataFrame:
+    """Return the columns of a source, or those that the user names, with systems and names."""
+    columns = {name: cells[own] for name, own in source.columns.items() if own in cells}
+    table = pd.DataFrame(columns | dict(given), index=cells.index)
+    if "system" not in table and (systems := _systems(cells, source)) is not None:
+        table["system"] = systems
+    return table.assign(building_id=_identifiers(table))
 
 
 def _has_no_size(table: pd.DataFrame) -> pd.Series:

@@ -58,17 +58,14 @@ class Projected(NamedTuple):
     ----------
     outlines : Outlines
         In metres.
-    place : (n, 2) ndarray
-        Longitude and latitude of the centroids, degrees.
-    area : (n,) ndarray
-        m2.
+    table : DataFrame
+        The buildings with longitude and latitude of their centroids, degrees, and areas, m2.
     central_meridian : float
         Degrees.
     """
 
     outlines: Outlines
-    place: FloatArray
-    area: FloatArray
+    table: pd.DataFrame
     central_meridian: float
 
 
@@ -116,14 +113,14 @@ def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
     return repeated
 
 
-def projected(outlines: pa.Array, source: str) -> Projected:
+def projected(buildings: Buildings, source: str) -> Projected:
     """
     Return outlines in metres, with their places in degrees and areas.
 
     Parameters
     ----------
-    outlines : pa.Array
-        WKB in degrees.
+    buildings : Buildings
+        Their table need not have places and areas.
     source : str
         The file, for messages.
 
@@ -132,6 +129,7 @@ def projected(outlines: pa.Array, source: str) -> Projected:
     CatalogError
         If they span more than 6 degrees of longitude.
     """
+    outlines = buildings.outlines
     # Places in degrees, and the region for which the projection is to be
     place, boxes = [], []
     for _, degrees in blocks(outlines):
@@ -149,10 +147,13 @@ def projected(outlines: pa.Array, source: str) -> Projected:
         return transformed(polygons(outlines.take(pa.array(numbers))), transformer)
 
     # Outlines may go on beyond 180 degrees, places do not
-    centres = np.concatenate(place)
-    centres[centres[:, 0] > 180.0, 0] -= 360.0
-    near = Outlines(np.concatenate(bounds), in_metres)
-    return Projected(near, centres, np.concatenate(area), central_meridian)
+    longitude, latitude = np.concatenate(place).T
+    table = buildings.table.assign(
+        longitude=np.where(longitude > 180.0, longitude - 360.0, longitude),
+        latitude=latitude,
+        area=np.concatenate(area),
+    )
+    return Projected(Outlines(np.concatenate(bounds), in_metres), table, central_meridian)
 
 
 def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:

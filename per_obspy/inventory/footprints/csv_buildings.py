@@ -6,6 +6,7 @@ latitude of their centres, width, length, and the azimuth of the length.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -129,46 +130,56 @@ def _missing(names: Sequence[str], columns: Mapping[str, str]) -> str:
 
 def _polygons(rows: pa.Table, columns: Mapping[str, str]) -> tuple[Geometries, dict[int, str]]:
     """Return polygons from WKT or GeoJSON, None where a cell has none, with the reasons."""
-    name, faults = columns["wkt"], dict[int, str]()
-    text = rows[name].to_pandas().fillna("").astype(str)
-    is_short = text.str.len() <= LONGEST_OUTLINE
-    is_wkt = (text.str.contains(_POLYGON, regex=True) & is_short).to_numpy(dtype=bool)
-    outlines = np.full(len(text), None, dtype=object)
+    name = columns["wkt"]
+    texts = rows[name].to_pandas().fillna("").astype(str)
+    cells = texts.where(texts.str.len() <= LONGEST_OUTLINE, "").to_numpy(dtype=object)
+    is_wkt = texts.str.contains(_POLYGON, regex=True).to_numpy(dtype=bool)
+    outlines = np.full(len(cells), None, dtype=object)
     # A number beyond all numbers becomes infinite, which no place on the Earth is
     with np.errstate(all="ignore"):
-        outlines[is_wkt] = shapely.from_wkt(text.to_numpy(object)[is_wkt], on_invalid="ignore")
-        for i in np.flatnonzero(text.str.startswith("{") & is_short).tolist():
-            try:
-                outlines[i] = shapely.from_geojson(geojson_text(text.iloc[i]), on_invalid="ignore")
-            except ValueError as error:
-                faults[i] = str(error)
+        outlines[is_wkt] = shapely.from_wkt(cells[is_wkt], on_invalid="ignore")
+        for i in np.flatnonzero(texts.str.startswith("{")).tolist():
+            with suppress(ValueError):
+                outlines[i] = shapely.from_geojson(geojson_text(cells[i]), on_invalid="ignore")
     # Each other cell with its reason
-    for i in np.flatnonzero(shapely.is_missing(outlines)).tolist():
-        problem = f"= {shortened(text.iloc[i].strip(), 40)!r} is no polygon as WKT or GeoJSON"
-        problem = "is empty" if is_unknown(text.iloc[i]) else problem
-        long = f"has more than {LONGEST_OUTLINE} characters"
-        faults.setdefault(i, f"{name} {problem if is_short.iloc[i] else long}")
-    return outlines, faults
+    lost = np.flatnonzero(shapely.is_missing(outlines)).tolist()
+    return outlines, {i: f"{name} {_no_polygon(texts[i])}" for i in lost}
+
+
+def _no_polygon(text: str) -> str:
+    """Return why a text is no outline."""
+    if len(text) > LONGEST_OUTLINE:
+        return f"has more than {LONGEST_OUTLINE} characters"
+    if is_unknown(text):
+        return "is empty"
+    return f"= {shortened(text.strip(), 40)!r} is no polygon as WKT or GeoJSON"
 
 
 def _rectangles(rows: pa.Table, columns: Mapping[str, str]) -> tuple[Geometries, dict[int, str]]:
     """Return rectangles about their centres, None where a row has none, with the first reason."""
-    sides, faults = [], dict[int, str]()
+    sides, faults = list[FloatArray](), dict[int, str]()
     for name in RECTANGLE:
-        cells = rows[columns[name]].to_pandas()
-        read, (low, high) = read_numbers(name, cells), _RANGES[name]
-        sides.append(np.where((read.values >= low) & (read.values <= high), read.values, np.nan))
-        # Empty cells by name, others as they are
-        for i in np.flatnonzero(np.isnan(sides[-1])).tolist():
-            is_empty = np.isnan(read.values[i]) and i not in read.notes | read.placeholders
-            reason = f"= {shortened(str(cells.iloc[i]), 40)!r} is no usable {name}"
-            faults.setdefault(i, f"{columns[name]} {'is empty' if is_empty else reason}")
+        side, problems = _side(name, rows[columns[name]].to_pandas())
+        sides.append(side)
+        faults = {i: f"{columns[name]} {problem}" for i, problem in problems.items()} | faults
     # Rows of which every number is known
     good = ~np.isnan(sides).any(axis=0)
     outlines = np.full(good.size, None, dtype=object)
     if good.any():
         outlines[good] = shapely.polygons(_corners(*(side[good] for side in sides)))
     return outlines, faults
+
+
+def _side(name: str, cells: pd.Series) -> tuple[FloatArray, dict[int, str]]:
+    """Return a number of rectangles, NaN where it cannot be used, with the reasons."""
+    read, (low, high) = read_numbers(name, cells), _RANGES[name]
+    good, problems = (read.values >= low) & (read.values <= high), dict[int, str]()
+    # Empty cells by name, others as they are
+    for i in np.flatnonzero(~good).tolist():
+        is_empty = np.isnan(read.values[i]) and i not in read.notes | read.placeholders
+        quoted = f"= {shortened(str(cells.iloc[i]), 40)!r} is no usable {name}"
+        problems[i] = "is empty" if is_empty else quoted
+    return np.where(good, read.values, np.nan), problems
 
 
 def _corners(

@@ -91,16 +91,10 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     CatalogError
         If the file is missing, or cannot be read as its suffix indicates.
     """
-    suffix = file.suffix.lower()
     if not file.exists():
         raise CatalogError(str(file), "no such file")
-    # GDAL knows further files, but not whether they hold footprints
-    if suffix not in SUFFIXES:
-        expected = ", ".join(SUFFIXES)
-        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
-    if not file.is_file():
-        raise CatalogError(str(file), "is no regular file")
-    if suffix in GDAL_KINDS:
+    _require_known(file)
+    if file.suffix.lower() in GDAL_KINDS:
         _require_beginning(file)
     # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
     # of .osm.pbf (reasoned)
@@ -111,6 +105,21 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
     return found
+
+
+def _require_known(file: Path) -> None:
+    """Check the suffix of a file: GDAL knows others, but not whether they hold outlines."""
+    suffix, problem = file.suffix.lower(), ""
+    if suffix not in SUFFIXES:
+        problem = f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
+    elif not file.is_file():
+        problem = "is no regular file"
+    # Tables and lines may be packed
+    elif suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
+        expected = ", ".join(f"{name}.gz" for name in _PACKED)
+        problem = f"unknown suffix {file.name[-20:]!r}, expected {expected}"
+    if problem:
+        raise CatalogError(str(file), problem)
 
 
 def _require_beginning(file: Path) -> None:
@@ -169,23 +178,23 @@ def _first_character(file: Path) -> bytes:
 @contextmanager
 def _unpacked(file: Path) -> Iterator[Path]:
     """Yield the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
-    if Path(file.stem).suffix.lower() not in _PACKED:
-        expected = ", ".join(f"{name}.gz" for name in _PACKED)
-        raise CatalogError(str(file), f"unknown suffix {file.name[-20:]!r}, expected {expected}")
-    ratio = f"it unpacks to more than {LARGEST_RATIO} times its packed size: unpack it by hand"
-    size = f"it has more than {LARGEST >> 30} GiB unpacked: split the file"
-    limits = {size: LARGEST, ratio: max(LARGEST_RATIO * file.stat().st_size, _SMALL)}
+    ratio = max(LARGEST_RATIO * file.stat().st_size, _SMALL)
     with scratch_folder() as folder:
-        plain = folder / file.stem
+        plain, problem = folder / file.stem, ""
         # Block by block, up to the limits
         try:
             with gzip.open(file) as packed, plain.open("wb") as copy:
-                while block := packed.read(1 << 20):
+                while not problem and (block := packed.read(1 << 20)):
                     copy.write(block)
-                    for problem in (text for text, most in limits.items() if copy.tell() > most):
-                        raise CatalogError(str(file), problem)
+                    if copy.tell() > LARGEST:
+                        problem = f"it has more than {LARGEST >> 30} GiB unpacked: split the file"
+                    elif copy.tell() > ratio:
+                        problem = f"it unpacks to more than {LARGEST_RATIO} times its packed size"
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise CatalogError(str(file), f"not a file packed by gzip: {error}") from error
+        # The copy is gone with its folder
+        if problem:
+            raise CatalogError(str(file), problem)
         yield plain
 
 
@@ -273,6 +282,7 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
         return
     with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
         foreign = _foreign(file, package)
+        # Only a package that has some is copied
         if not foreign:
             yield file, foreign
             return
@@ -319,6 +329,7 @@ def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> 
     names = ", ".join(kinds) or "none"
     # A layer without geometries is a table
     spatial = [name for name, kind in kinds.items() if kind is not None]
+    # A view may be what the user means
     if layer in views or (views and layer is None and not any(kinds.values())):
         shown = layer or ", ".join(sorted(views))
         problem = f"layer {shown} is a view, which may have no end: save it as a table"
@@ -376,27 +387,31 @@ def _read_geoparquet(file: Path, source: str) -> RawLayer:
         table = _without_nesting(pa.parquet.read_table(file.absolute()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(source, unreadable_reason(file, "Parquet table", error)) from error
+    name, crs = _geometry_column(source, table)
+    return _raw_layer(source, table[name], table.drop_columns([name]), crs)
+
+
+def _geometry_column(source: str, table: pa.Table) -> tuple[str, Any]:
+    """Return name and coordinate reference system of the primary geometry column."""
     # GeoParquet is described by JSON in the metadata
-    described = (table.schema.metadata or {}).get(b"geo")
-    if described is None:
+    metadata, problem = table.schema.metadata or {}, "wrong GeoParquet metadata:"
+    if b"geo" not in metadata:
         problem = "no GeoParquet metadata: a table of pairs is no layer of footprints"
         raise CatalogError(source, problem)
     try:
-        geo = json.loads(described)
+        geo = json.loads(metadata[b"geo"])
         name = geo["primary_column"]
-        column = geo["columns"][name]
-        encoding, kind = column.get("encoding"), table[name].type
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        problem = f"wrong GeoParquet metadata: {type(error).__name__} {error}"
-        raise CatalogError(source, problem) from error
-    if encoding != "WKB":
-        raise CatalogError(source, f"geometries are encoded as {encoding!r}, expected WKB")
-    if kind not in (pa.binary(), pa.large_binary()):
-        problem = f"wrong GeoParquet metadata: column {name} is {kind}, not bytes"
+        # A missing CRS means OGC:CRS84 by the specification, an explicit null means unknown
+        column = {"encoding": None, "crs": "OGC:CRS84", **geo["columns"][name]}
+        kind = table[name].type
+    except (KeyError, TypeError, ValueError) as error:
+        raise CatalogError(source, f"{problem} {type(error).__name__} {error}") from error
+    if column["encoding"] != "WKB":
+        problem = f"geometries are encoded as {column['encoding']!r}, expected WKB"
         raise CatalogError(source, problem)
-    # A missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
-    crs = column.get("crs", "OGC:CRS84")
-    return _raw_layer(source, table[name], table.drop_columns([name]), crs)
+    if kind not in (pa.binary(), pa.large_binary()):
+        raise CatalogError(source, f"{problem} column {name} is {kind}, not bytes")
+    return name, column["crs"]
 
 
 def _without_nesting(table: pa.Table) -> pa.Table:
@@ -409,22 +424,21 @@ def _without_nesting(table: pa.Table) -> pa.Table:
     for field in table.schema:
         name, kind = field.name, field.type
         fields = {part.name for part in kind} if pa.types.is_struct(kind) else set()
+        # The geometry gives the box anyway
         if fields >= {"xmin", "ymin", "xmax", "ymax"}:
             table = table.drop_columns([name])
-            continue
-        # The value of a cell as text
-        if name == "names" and "primary" in fields:
-            value: Callable[[Any], object] = lambda row: row["primary"]
+        elif name == "names" and "primary" in fields:
+            table = _as_texts(table, name, lambda row: row["primary"])
         elif name == "sources" and pa.types.is_list(kind):
-            value = lambda rows: (
-                rows[0].get("dataset") if rows and isinstance(rows[0], dict) else None
-            )
+            table = _as_texts(table, name, _first_dataset)
         elif pa.types.is_map(kind):
-            value = lambda tags: json.dumps(dict(tags))
-        else:
-            continue
-        table = _as_texts(table, name, value)
+            table = _as_texts(table, name, lambda tags: json.dumps(dict(tags)))
     return table
+
+
+def _first_dataset(rows: list[Any]) -> object:
+    """Return the data set of the first of several sources, None if it has none."""
+    return rows[0].get("dataset") if rows and isinstance(rows[0], dict) else None
 
 
 def _as_texts(table: pa.Table, name: str, value: Callable[[Any], object]) -> pa.Table:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.footprints.layer_files import read_raw_layer
-from per_obspy.inventory.footprints.raw_layer import Geometries, RawLayer
+from per_obspy.inventory.footprints.raw_layer import Geometries, RawLayer, as_wkb
 
 #: Features per block, to bound memory.
 BLOCK = 20_000
@@ -73,29 +73,25 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     _require_outlines(file, raw)
     transformer, is_projected = _to_degrees(file, raw.crs)
     # Outlines that can be used and reasons for the others, block by block
-    outlines, rejected, good = [], list(raw.broken), list[NDArray[np.bool_]]()
+    outlines, rejected, good = [], list(raw.broken), np.ones(len(raw.wkb), dtype=bool)
     for start, original in blocks(raw.wkb):
         degrees = _in_degrees(original, transformer)
-        # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates
-        # are degrees
-        stray = _on_earth(original) if is_projected else np.zeros(len(original), dtype=bool)
-        good.append(_are_footprints(degrees) & ~stray)
-        outlines.append(pa.array(shapely.to_wkb(degrees[good[-1]]), pa.large_binary()))
-        for i in np.flatnonzero(~good[-1]).tolist():
-            # A reader may know the fault, else the geometry shows it
-            fault = raw.faults.get(start + i) or _fault(degrees[i], original[i], bool(stray[i]))
-            rejected.append(_rejection(file, int(raw.numbers[start + i]), fault))
-    usable = np.concatenate(good)
-    attributes = raw.attributes.filter(pa.array(usable)).to_pandas()
-    attributes.index = pd.Index(raw.numbers[usable])
+        faults = _faults(degrees, original, is_projected)
+        outlines.append(as_wkb(np.delete(degrees, list(faults))))
+        for i, fault in faults.items():
+            good[start + i] = False
+            rejected.append(_rejection(file, raw, start + i, fault))
+    attributes = raw.attributes.filter(pa.array(good)).to_pandas()
+    attributes.index = pd.Index(raw.numbers[good])
     # In the order of the file
     rejected.sort(key=lambda row: row.row or 0)
     return Layer(pa.concat_arrays(outlines), attributes, tuple(rejected))
 
 
-def _rejection(file: Path, number: int, fault: str) -> Rejection:
-    """Return the rejection of a feature by its number, or line of a table."""
-    return Rejection("building", f"feature {number}", str(file), number, (fault,))
+def _rejection(file: Path, raw: RawLayer, i: int, fault: str) -> Rejection:
+    """Return the rejection of a feature, by the fault that its reader knows, else its geometry."""
+    number, reason = int(raw.numbers[i]), raw.faults.get(i, fault)
+    return Rejection("building", f"feature {number}", str(file), number, (reason,))
 
 
 def polygons(outlines: pa.Array) -> Geometries:
@@ -166,10 +162,15 @@ def _in_degrees(original: Geometries, transformer: pyproj.Transformer) -> Geomet
     return degrees
 
 
-def _are_footprints(degrees: Geometries) -> NDArray[np.bool_]:
-    """Return where geometries are valid polygons on the Earth."""
+def _faults(degrees: Geometries, original: Geometries, is_projected: bool) -> dict[int, str]:
+    """Return the geometries that are no footprints, by position, with the reasons."""
+    # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates are
+    # degrees
+    stray = _on_earth(original) & is_projected
     polygonal = np.isin(shapely.get_type_id(degrees), _POLYGONAL) & ~shapely.is_empty(degrees)
-    return np.asarray(polygonal & _on_earth(degrees) & shapely.is_valid(degrees))
+    good = polygonal & _on_earth(degrees) & shapely.is_valid(degrees) & ~stray
+    bad = np.flatnonzero(~good).tolist()
+    return {i: _fault(degrees[i], original[i], bool(stray[i])) for i in bad}
 
 
 def _on_earth(degrees: Geometries | shapely.Geometry) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ class RawLayer(NamedTuple):
 
     Attributes
     ----------
-    wkb : pa.ChunkedArray
+    wkb : pa.Array or pa.ChunkedArray
         Geometries as WKB, first coordinate east, second north; null where there is none.
     attributes : pa.Table
         One row per geometry.
@@ -36,7 +36,7 @@ class RawLayer(NamedTuple):
         Lines of a table that are no rows.
     """
 
-    wkb: pa.ChunkedArray
+    wkb: pa.Array | pa.ChunkedArray
     attributes: pa.Table
     crs: Any
     numbers: NDArray[np.int64]
@@ -53,9 +53,9 @@ def features(
     return RawLayer(as_wkb(shapes), attributes, crs, numbers, faults)
 
 
-def as_wkb(shapes: Geometries) -> pa.ChunkedArray:
-    """Return geometries as WKB."""
-    return pa.chunked_array([pa.array(shapely.to_wkb(shapes), pa.large_binary())])
+def as_wkb(shapes: Geometries) -> pa.Array:
+    """Return geometries as WKB, null where there is none."""
+    return pa.array(shapely.to_wkb(shapes), pa.large_binary())
 
 
 def cell_table(rows: Iterable[Mapping[str, object]]) -> pa.Table:

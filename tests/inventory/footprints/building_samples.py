@@ -51,7 +51,7 @@ def small_town() -> Town:
 
 def geometries(raw: Any) -> np.ndarray:
     """Return the geometries of a layer as its reader has it."""
-    return shapely.from_wkb(raw.wkb.to_numpy())
+    return shapely.from_wkb(raw.wkb.to_pylist())
 
 
 def _geojson(geometry: Any) -> Any:
