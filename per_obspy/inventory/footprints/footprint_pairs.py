@@ -6,11 +6,10 @@ Rows of the table are made and checked block by block, to bound memory.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
@@ -40,6 +39,10 @@ OVERLAP = 0.02
 
 #: Pairs per block, to bound memory.
 CHUNK = 50_000
+
+#: Columns of a pair as they are measured, and those that help to make its row.
+_MEASURED = ("first", "second", "overlap", "gap", "facing_length", "inside_1", "inside_2")
+_HELPERS = ["first", "second", "overlap", "inside_1", "inside_2", "repeated"]
 
 #: Columns that every building has besides those of its layer.
 _PLACE = ["longitude", "latitude", "area"]
@@ -137,11 +140,9 @@ def find_footprint_pairs(
     if near.first.size == 0:
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
     # Pairs, checked as if they came from a file
+    drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
     found = _pairs_of(near, shapes)
-    found = found.assign(
-        gap_std=deviation, gap_std_source="assumed" if gap_std is None else "given"
-    )
-    pairs, unusable = _checked_table(found, shapes.table, source)
+    pairs, unusable = _checked_table(found, shapes.table, drawn, source)
     pairs.attrs["rejected"] = Rejections((*rejected, *unusable))
     left_out = _middle(found, shapes.table, unusable)
     return FootprintPairs(pairs, Buildings(buildings.outlines, shapes.table), left_out)
@@ -184,42 +185,39 @@ def _require_within(name: str, length: float, column: str) -> None:
 
 def _pairs_of(near: Neighbours, shapes: Projected) -> pd.DataFrame:
     """Return one row per pair: positions of its buildings, and what does not depend on a column."""
-    names = shapes.table["building_id"].to_numpy(dtype=object)
+    buildings = shapes.table["building_id"].to_numpy(dtype=object)
     longitude, latitude = (shapes.table[name].to_numpy() for name in ("longitude", "latitude"))
     # A projection's north turns with the longitude
     east = longitude[near.first] - shapes.central_meridian
     east -= 360.0 * np.round(east / 360.0)
     convergence = east * np.sin(np.deg2rad(latitude[near.first]))
+    names = pd.Series(buildings[near.first] + "/" + buildings[near.second])
     columns = {
-        "first": near.first,
-        "second": near.second,
-        "overlap": near.overlap,
-        "pair_id": names[near.first] + "/" + names[near.second],
-        "gap": near.gap,
+        **{name: getattr(near, name) for name in _MEASURED},
         "azimuth": (near.azimuth + convergence) % 360.0,
-        "facing_length": near.facing_length,
-        "position": _position(near.inside_1 & near.inside_2),
-        "position_1": _position(near.inside_1),
-        "position_2": _position(near.inside_2),
+        "pair_id": names,
+        "repeated": names.duplicated(),
     }
-    pairs = pd.DataFrame(columns)
-    # Repeated names are known of all pairs only
-    return pairs.assign(repeated=pairs["pair_id"].duplicated())
+    # No copy: neighbours are many
+    return pd.DataFrame(columns, copy=False)
 
 
-def _position(is_inside: NDArray[np.bool_]) -> NDArray[np.object_]:
-    """Return the words for the place in a row of buildings."""
-    return np.where(is_inside, *POSITIONS[::-1]).astype(object)
+def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return pairs with the words for their place, and that of both buildings, in a row."""
+    inside_1, inside_2 = pairs["inside_1"], pairs["inside_2"]
+    inside = {"position": inside_1 & inside_2, "position_1": inside_1, "position_2": inside_2}
+    words = dict(zip((False, True), POSITIONS, strict=True))
+    return pairs.assign(**{name: each.map(words) for name, each in inside.items()})
 
 
 def _checked_table(
-    found: pd.DataFrame, buildings: pd.DataFrame, source: str
+    found: pd.DataFrame, buildings: pd.DataFrame, drawn: Mapping[str, Any], source: str
 ) -> tuple[pd.DataFrame, list[Rejection]]:
     """Return the pair table, and a rejection for each pair that cannot be used."""
     columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
     for start in range(0, len(found), CHUNK):
         part = _with_buildings(found.iloc[start : start + CHUNK], buildings)
-        checked = _checked_block(part, source, rejected)
+        checked = _checked_block(part.assign(**drawn), source, rejected)
         for name, column in checked.items():
             columns.setdefault(str(name), []).append(column.copy())
     # Joined column by column, so that no second copy of the whole table is in memory
@@ -236,11 +234,10 @@ def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -
         area, name = part.loc[row, "overlap"], str(part.loc[row, "pair_id"])
         reason = f"footprints overlap by {area:.3g} m2, {share[row]:.0%} of the smaller one"
         rejected.append(Rejection("pair", name, source, None, (reason,)))
-    clear = part.drop(index=overlaps.index, columns=["first", "second", "overlap"])
-    clear = clear.reset_index(drop=True)
+    clear = part.drop(index=overlaps.index).reset_index(drop=True)
+    repeated, lines = clear["repeated"].to_numpy(), np.arange(2, len(clear) + 2)
     # Pairs have no line in the file
-    repeated = clear.pop("repeated").to_numpy()
-    checked = checked_pairs(clear, source, np.arange(2, len(clear) + 2), repeated)
+    checked = checked_pairs(clear.drop(columns=_HELPERS), source, lines, repeated)
     rejected += [row._replace(row=None) for row in checked.attrs["rejected"]]
     checked.attrs = {}
     return _with_contact(checked)
@@ -249,9 +246,9 @@ def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -
 def _with_buildings(pairs: pd.DataFrame, buildings: pd.DataFrame) -> pd.DataFrame:
     """Return some pairs with the columns of both buildings, before any check."""
     names = [*_PLACE, *buildings.columns.drop(_PLACE)]
-    sides = [pairs.reset_index(drop=True)]
+    sides = [_with_positions(pairs.reset_index(drop=True))]
     for i, side in ((1, "first"), (2, "second")):
-        chosen = _with_height(buildings[names].iloc[pairs[side]].reset_index(drop=True))
+        chosen = _with_height(buildings.iloc[pairs[side]][names].reset_index(drop=True))
         # Columns of a pair, in notes too, have the number of the building
         if NOTES in chosen:
             notes, word = chosen[NOTES].fillna("").astype(str), r"(^|; )(\w+) = "
