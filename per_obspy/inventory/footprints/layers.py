@@ -150,7 +150,7 @@ def transformed(shapes: Geometries, transformer: pyproj.Transformer) -> Geometri
 
 def _in_degrees(original: Geometries, transformer: pyproj.Transformer) -> Geometries:
     """Return geometries in longitude and latitude."""
-    degrees = transformed(shapely.force_2d(original), transformer)
+    degrees = transformed(original, transformer)
     # A building across 180 degrees has longitudes of both signs, which would reach around the Earth
     west, _, east, _ = shapely.bounds(degrees).T
     for i in np.flatnonzero((east - west > 180.0) & (east - west <= 360.0)).tolist():
