@@ -190,6 +190,7 @@ def _unpacked(file: Path) -> Iterator[Path]:
                         problem = f"it has more than {LARGEST >> 30} GiB unpacked: split the file"
                     elif copy.tell() > ratio:
                         problem = f"it unpacks to more than {LARGEST_RATIO} times its packed size"
+                        problem += ": unpack it by hand"
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise CatalogError(str(file), f"not a file packed by gzip: {error}") from error
         # The copy is gone with its folder
@@ -297,18 +298,18 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
 def _foreign(file: Path, package: sqlite3.Connection) -> set[str]:
     """Return views and virtual tables but for the index of places; refuse computed columns."""
     search = "SELECT type, name, sql FROM sqlite_master WHERE type IN ('view', 'table')"
-    entries = package.execute(search).fetchall()
-    tables = {name for kind, name, _ in entries if kind == "table"}
-    stored = {
-        name for _, name, sql in entries if not sql or _TABLE.match(sql) or _PLACES.match(sql)
-    }
+    foreign, tables = set[str](), list[str]()
+    for kind, name, sql in package.execute(search).fetchall():
+        tables += [name] if kind == "table" else []
+        if sql and not (_TABLE.match(sql) or _PLACES.match(sql)):
+            foreign.add(name)
     # Functions that compute a column may do anything
-    for table in tables & stored:
+    for table in (name for name in tables if name not in foreign):
         computed = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
         for (column,) in package.execute(computed, (table,)):
             problem = f"column {column} of table {table} is computed, expected a stored one"
             raise CatalogError(str(file), problem)
-    return {name for _, name, _ in entries} - stored
+    return foreign
 
 
 def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:

@@ -81,11 +81,17 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
         for i, fault in faults.items():
             good[start + i] = False
             rejected.append(_rejection(file, raw, start + i, fault))
-    attributes = raw.attributes.filter(pa.array(good)).to_pandas()
-    attributes.index = pd.Index(raw.numbers[good])
+    attributes = _attributes(raw, good)
     # In the order of the file
     rejected.sort(key=lambda row: row.row or 0)
     return Layer(pa.concat_arrays(outlines), attributes, tuple(rejected))
+
+
+def _attributes(raw: RawLayer, good: NDArray[np.bool_]) -> pd.DataFrame:
+    """Return the attributes of usable features by their number; a layer may have no column."""
+    mask, columns = pa.array(good), raw.attributes
+    cells = {name: columns[name].filter(mask).to_pandas().array for name in columns.column_names}
+    return pd.DataFrame(cells, index=pd.Index(raw.numbers[good]), copy=False)
 
 
 def _rejection(file: Path, raw: RawLayer, i: int, fault: str) -> Rejection:
