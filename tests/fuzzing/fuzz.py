@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 HERE = Path(__file__).parent
-for folder in ("formats", "records", "inventory/importers", "inventory/files", "fuzzing"):
+for folder in ("formats", "records", "inventory/footprints", "inventory/files", "fuzzing"):
     sys.path.insert(0, str(HERE.parent / folder))
 
 from entries import Entry, entries  # noqa: E402 - found by the lines above

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import written_whole
-from per_obspy.inventory.footprints.layers import BLOCK, Geometries, polygons
-from per_obspy.inventory.footprints.neighbours import Outlines
+from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, transformed
+from per_obspy.inventory.footprints.neighbours import IntArray, Outlines
+from per_obspy.inventory.footprints.raw_layer import Geometries
 
 #: A local projection is true to scale within this range of longitudes, degrees.
 WIDEST_LAYER = 6.0
@@ -57,17 +58,14 @@ class Projected(NamedTuple):
     ----------
     outlines : Outlines
         In metres.
-    place : (n, 2) ndarray
-        Longitude and latitude of the centroids, degrees.
-    area : (n,) ndarray
-        m2.
+    table : DataFrame
+        The buildings with longitude and latitude of their centroids, degrees, and areas, m2.
     central_meridian : float
         Degrees.
     """
 
     outlines: Outlines
-    place: FloatArray
-    area: FloatArray
+    table: pd.DataFrame
     central_meridian: float
 
 
@@ -88,44 +86,41 @@ def without_repetitions(
     """
     identifiers = table["building_id"]
     same_shape, same_name = _repeated(outlines), identifiers.duplicated().to_numpy()
+    repeats = same_shape | same_name
     # Each repetition with its reasons
     rejected = []
-    for i in np.flatnonzero(same_shape | same_name).tolist():
+    for i in np.flatnonzero(repeats).tolist():
         name, number = identifiers.iloc[i], int(table.index[i])
-        reasons = []
-        if same_shape[i]:
-            reasons.append("the polygon repeats an earlier one")
-        if same_name[i]:
-            reasons.append(f"building_id = {name!r} occurs in an earlier feature already")
-        rejected.append(Rejection("building", name, source, number, tuple(reasons)))
-    good = ~(same_shape | same_name)
-    kept = outlines.filter(pa.array(good)) if rejected else outlines
-    return Buildings(kept, table[good] if rejected else table), tuple(rejected)
+        shape = ["the polygon repeats an earlier one"] * int(same_shape[i])
+        again = [f"building_id = {name!r} occurs in an earlier feature already"] * int(same_name[i])
+        rejected.append(Rejection("building", name, source, number, (*shape, *again)))
+    if rejected:
+        outlines, table = outlines.filter(pa.array(~repeats)), table[~repeats]
+    return Buildings(outlines, table), tuple(rejected)
 
 
 def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
     """Return where an outline repeats an earlier one, whatever the order of its points."""
     hashes = [np.empty(0, dtype=np.uint64)]
-    for start in range(0, len(outlines), BLOCK):
-        normal = shapely.to_wkb(shapely.normalize(polygons(outlines.slice(start, BLOCK))))
+    for _, shapes in blocks(outlines):
+        normal = shapely.to_wkb(shapely.normalize(shapes))
         hashes.append(pd.util.hash_array(normal, categorize=False))
-    hashed = pd.Series(np.concatenate(hashes))
     # A hash may be shared by chance: the outlines themselves decide
-    shared = np.flatnonzero(hashed.duplicated(keep=False))
+    shared = np.flatnonzero(pd.Series(np.concatenate(hashes)).duplicated(keep=False))
     shapes = shapely.to_wkb(shapely.normalize(polygons(outlines.take(pa.array(shared)))))
     repeated = np.zeros(len(outlines), dtype=bool)
     repeated[shared] = pd.Series(shapes, dtype=object).duplicated()
     return repeated
 
 
-def projected(outlines: pa.Array, source: str) -> Projected:
+def projected(buildings: Buildings, source: str) -> Projected:
     """
     Return outlines in metres, with their places in degrees and areas.
 
     Parameters
     ----------
-    outlines : pa.Array
-        WKB in degrees.
+    buildings : Buildings
+        Their table need not have places and areas.
     source : str
         The file, for messages.
 
@@ -134,29 +129,31 @@ def projected(outlines: pa.Array, source: str) -> Projected:
     CatalogError
         If they span more than 6 degrees of longitude.
     """
+    outlines = buildings.outlines
     # Places in degrees, and the region for which the projection is to be
-    blocks = [outlines.slice(start, BLOCK) for start in range(0, len(outlines), BLOCK)]
     place, boxes = [], []
-    for block in blocks:
-        degrees = polygons(block)
+    for _, degrees in blocks(outlines):
         place.append(shapely.get_coordinates(shapely.centroid(degrees)))
         boxes.append(shapely.bounds(degrees))
     transformer, central_meridian = _projection(np.concatenate(boxes), source)
     # Boxes and areas in metres
     bounds, area = [], []
-    for block in blocks:
-        metres = _in_metres(block, transformer)
+    for _, degrees in blocks(outlines):
+        metres = transformed(degrees, transformer)
         bounds.append(shapely.bounds(metres))
         area.append(shapely.area(metres))
 
-    near = Outlines(
-        np.concatenate(bounds),
-        lambda numbers: _in_metres(outlines.take(pa.array(numbers)), transformer),
-    )
+    def in_metres(numbers: IntArray) -> Geometries:
+        return transformed(polygons(outlines.take(pa.array(numbers))), transformer)
+
     # Outlines may go on beyond 180 degrees, places do not
-    centres = np.concatenate(place)
-    centres[centres[:, 0] > 180.0, 0] -= 360.0
-    return Projected(near, centres, np.concatenate(area), central_meridian)
+    longitude, latitude = np.concatenate(place).T
+    table = buildings.table.assign(
+        longitude=np.where(longitude > 180.0, longitude - 360.0, longitude),
+        latitude=latitude,
+        area=np.concatenate(area),
+    )
+    return Projected(Outlines(np.concatenate(bounds), in_metres), table, central_meridian)
 
 
 def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:
@@ -181,14 +178,6 @@ def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, flo
     return pyproj.Transformer.from_crs("OGC:CRS84", local, always_xy=True), longitude
 
 
-def _in_metres(outlines: pa.Array, transformer: pyproj.Transformer) -> Geometries:
-    """Return outlines in a projection."""
-    metres = shapely.transform(
-        polygons(outlines), lambda xy: np.column_stack(transformer.transform(*xy.T))
-    )
-    return np.asarray(metres)
-
-
 def write_buildings(buildings: Buildings, path: Path) -> None:
     """
     Write buildings as GeoParquet, whole or not at all.
@@ -202,13 +191,10 @@ def write_buildings(buildings: Buildings, path: Path) -> None:
     """
     table = pa.Table.from_pandas(buildings.table, preserve_index=False)
     outlines = buildings.outlines.cast(pa.binary())
-    table = table.append_column(GEOMETRY, outlines).replace_schema_metadata(_described())
-    with written_whole(path) as part:
-        pa.parquet.write_table(table, part, row_group_size=5 * BLOCK)
-
-
-def _described() -> dict[str, str]:
-    """Return the metadata of GeoParquet; without a reference system it means degrees, WGS 84."""
+    # Without a reference system GeoParquet means degrees, WGS 84
     column = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"]}
     geo = {"version": GEOPARQUET, "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
-    return {"geo": json.dumps(geo)}
+    table = table.append_column(GEOMETRY, outlines)
+    with written_whole(path) as part:
+        described = table.replace_schema_metadata({"geo": json.dumps(geo)})
+        pa.parquet.write_table(described, part, row_group_size=5 * BLOCK)

@@ -1,8 +1,12 @@
-"""Pairs of neighbouring buildings from footprints, as a checked pair table."""
+"""
+Pairs of neighbouring buildings from footprints, as a checked pair table.
+
+Rows of the table are made and checked block by block, to bound memory.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -10,17 +14,38 @@ import pandas as pd
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.checking import Rejections
+from per_obspy.inventory.cells import NOTES
+from per_obspy.inventory.checking import Rejections, checked_pairs
+from per_obspy.inventory.contact_height import floor_offset
 from per_obspy.inventory.footprints.building_columns import building_columns
-from per_obspy.inventory.footprints.buildings import Buildings, projected, without_repetitions
-from per_obspy.inventory.footprints.footprint_rows import NearBuildings, pair_names, pair_table
+from per_obspy.inventory.footprints.buildings import (
+    Buildings,
+    Projected,
+    projected,
+    without_repetitions,
+)
 from per_obspy.inventory.footprints.layers import read_layer
-from per_obspy.inventory.footprints.neighbours import neighbours
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.footprints.neighbours import Neighbours, neighbours
+from per_obspy.inventory.schema import COLUMNS, POSITIONS
+from per_obspy.inventory.table_columns import numbers_in
 
 #: Standard deviation of a gap between drawn outlines without a known one, m: 0.2 mm, about the
 #: finest that a plan shows, at a scale of 1:500. It is assumed, not measured.
 DRAWN = 0.1
+
+#: Share of the smaller footprint that may be covered by both: digitised party walls cross by
+#: centimetres.
+OVERLAP = 0.02
+
+#: Pairs per block, to bound memory.
+CHUNK = 50_000
+
+#: Columns of a pair as they are measured, and those that help to make its row.
+_MEASURED = ("first", "second", "overlap", "gap", "facing_length", "inside_1", "inside_2")
+_HELPERS = ["first", "second", "overlap", "inside_1", "inside_2", "repeated"]
+
+#: Columns that every building has besides those of its layer.
+_PLACE = ["longitude", "latitude", "area"]
 
 
 class FootprintPairs(NamedTuple):
@@ -57,8 +82,8 @@ def pairs_from_footprints(
     path : str or Path
         GeoPackage, GeoJSON, Shapefile, FlatGeobuf or GeoParquet of polygons with heights or
         storeys, or a CSV list of buildings with outlines as WKT or with longitude, latitude, width,
-        length and azimuth. Known column names are in
-        ``per_obspy.inventory.importers``; lengths may have units (``6 m``, ``20 ft``).
+        length and azimuth. Known column names are in ``sources.toml`` next to this module;
+        lengths may have units (``6 m``, ``20 ft``).
     distance : float, optional
         Largest gap of a pair, m.
     layer : str, optional
@@ -102,67 +127,159 @@ def find_footprint_pairs(
     columns: Mapping[str, str] | None = None,
 ) -> FootprintPairs:
     """Find pairs as :func:`pairs_from_footprints` does, and keep the buildings."""
-    largest = _checked_length("distance", distance, "gap")
-    deviation = DRAWN if gap_std is None else _checked_length("gap_std", gap_std, "gap_std")
-    drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
+    largest = checks.number("distance", distance, checks.positive)
+    _require_within("distance", largest, "gap")
+    deviation = DRAWN if gap_std is None else gap_std
+    deviation = checks.number("gap_std", deviation, checks.not_negative)
+    _require_within("gap_std", deviation, "gap_std")
     # Footprints, without those that repeat another
     source = str(path)
-    buildings, rejected = _usable_buildings(Path(path), layer, columns or {})
-    shapes = projected(buildings.outlines, source)
-    longitude, latitude = shapes.place.T
-    table = buildings.table.assign(longitude=longitude, latitude=latitude, area=shapes.area)
-    # Pairs, checked as if they came from a file
+    buildings, rejected = _usable_buildings(path, layer, columns or {})
+    shapes = projected(buildings, source)
     near = neighbours(shapes.outlines, largest)
     if near.first.size == 0:
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
-    found = NearBuildings(near, table, drawn, shapes.central_meridian)
-    pairs = pair_table(found, source)
-    middle = _middle(found, pairs.attrs["rejected"])
-    pairs.attrs["rejected"] = Rejections(rejected + pairs.attrs["rejected"])
-    return FootprintPairs(pairs, Buildings(buildings.outlines, table), middle)
+    # Pairs, checked as if they came from a file
+    drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
+    found = _pairs_of(near, shapes)
+    pairs, unusable = _checked_table(found, shapes.table, drawn, source)
+    pairs.attrs["rejected"] = Rejections((*rejected, *unusable))
+    left_out = _middle(found, shapes.table, unusable)
+    return FootprintPairs(pairs, Buildings(buildings.outlines, shapes.table), left_out)
 
 
-def _middle(found: NearBuildings, rejected: Sequence[Rejection]) -> FloatArray:
+def _middle(
+    found: pd.DataFrame, buildings: pd.DataFrame, rejected: Sequence[Rejection]
+) -> FloatArray:
     """Return longitude and latitude amid both buildings of rejected pairs, degrees."""
-    names = {rejection.name for rejection in rejected}
-    chosen = pair_names(found).isin(names).to_numpy()
-    places = found.buildings[["longitude", "latitude"]].to_numpy()
-    first, second = places[found.near.first[chosen]], places[found.near.second[chosen]]
-    return np.asarray(0.5 * (first + second))
+    lost = found[found["pair_id"].isin({rejection.name for rejection in rejected})]
+    places = buildings[["longitude", "latitude"]].to_numpy()
+    return np.asarray(0.5 * (places[lost["first"]] + places[lost["second"]]))
 
 
 def _usable_buildings(
-    file: Path, layer: str | None, columns: Mapping[str, str]
+    path: str | Path, layer: str | None, columns: Mapping[str, str]
 ) -> tuple[Buildings, tuple[Rejection, ...]]:
-    """Return the buildings of a layer, and the features that are none."""
-    # Columns under the names of the schema, and outlines that are no second one
-    outlines, attributes, lost = read_layer(file, layer)
-    table = building_columns(attributes, columns, str(file))
-    buildings, repeated = without_repetitions(outlines, table, str(file))
-    rejected = (*lost, *repeated)
-    if len(buildings.outlines) < 2:
-        raise CatalogError(str(file), _too_few(len(buildings.outlines), rejected))
+    """Return the buildings of a layer under the names of the schema, and features that are none."""
+    outlines, attributes, lost = read_layer(path, layer)
+    table = building_columns(attributes, columns, str(path))
+    buildings, repeated = without_repetitions(outlines, table, str(path))
+    rejected, usable = (*lost, *repeated), len(buildings.outlines)
+    if usable < 2:
+        problem = f"{usable} usable footprints make no pair"
+        # With the reasons of the first rejected one
+        for first in rejected[:1]:
+            reasons = "; ".join(first.reasons)
+            problem += f" ({len(rejected)} rejected, {first.name}: {reasons})"
+        raise CatalogError(str(path), problem)
     return buildings, rejected
 
 
-def _checked_length(name: str, value: float, column: str) -> float:
-    """Return a length, m, if it is in the range of a column."""
-    if column == name:
-        length = checks.number(name, value, checks.not_negative)
-    else:
-        length = checks.number(name, value, checks.positive)
+def _require_within(name: str, length: float, column: str) -> None:
+    """Raise ValueError if a length, m, is above the range of a column."""
     limit = COLUMNS[column].high
     if length > limit:
-        raise ValueError(
-            f"{name} must not be above the largest {column}, {limit:g} m, got {length:g}"
-        )
-    return length
+        problem = f"must not be above the largest {column}, {limit:g} m, got {length:g}"
+        raise ValueError(f"{name} {problem}")
 
 
-def _too_few(usable: int, rejected: Sequence[Rejection]) -> str:
-    """Return the message for too few footprints, with the reasons of the first rejected one."""
-    problem = f"{usable} usable footprints make no pair"
-    if not rejected:
-        return problem
-    reasons = "; ".join(rejected[0].reasons)
-    return f"{problem} ({len(rejected)} rejected, {rejected[0].name}: {reasons})"
+def _pairs_of(near: Neighbours, shapes: Projected) -> pd.DataFrame:
+    """Return one row per pair: positions of its buildings, and what does not depend on a column."""
+    buildings = shapes.table["building_id"].to_numpy(dtype=object)
+    longitude, latitude = (shapes.table[name].to_numpy() for name in ("longitude", "latitude"))
+    # A projection's north turns with the longitude
+    east = longitude[near.first] - shapes.central_meridian
+    east -= 360.0 * np.round(east / 360.0)
+    convergence = east * np.sin(np.deg2rad(latitude[near.first]))
+    names = pd.Series(buildings[near.first] + "/" + buildings[near.second])
+    columns = {
+        **{name: getattr(near, name) for name in _MEASURED},
+        "azimuth": (near.azimuth + convergence) % 360.0,
+        "pair_id": names,
+        "repeated": names.duplicated(),
+    }
+    # No copy: neighbours are many
+    return pd.DataFrame(columns, copy=False)
+
+
+def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return pairs with the words for their place, and that of both buildings, in a row."""
+    inside_1, inside_2 = pairs["inside_1"], pairs["inside_2"]
+    inside = {"position": inside_1 & inside_2, "position_1": inside_1, "position_2": inside_2}
+    words = dict(zip((False, True), POSITIONS, strict=True))
+    return pairs.assign(**{name: each.map(words) for name, each in inside.items()})
+
+
+def _checked_table(
+    found: pd.DataFrame, buildings: pd.DataFrame, drawn: Mapping[str, Any], source: str
+) -> tuple[pd.DataFrame, list[Rejection]]:
+    """Return the pair table, and a rejection for each pair that cannot be used."""
+    columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
+    for start in range(0, len(found), CHUNK):
+        part = _with_buildings(found.iloc[start : start + CHUNK], buildings)
+        checked = _checked_block(part.assign(**drawn), source, rejected)
+        for name, column in checked.items():
+            columns.setdefault(str(name), []).append(column.copy())
+    # Joined column by column, so that no second copy of the whole table is in memory
+    joined = {name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}
+    return pd.DataFrame(joined, copy=False), rejected
+
+
+def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -> pd.DataFrame:
+    """Return the usable pairs of a block, and add the rejections of the others to a list."""
+    # One reason at most
+    share = part["overlap"] / part[["area_1", "area_2"]].min(axis=1)
+    overlaps = share[share > OVERLAP]
+    for row in overlaps.index:
+        area, name = part.loc[row, "overlap"], str(part.loc[row, "pair_id"])
+        reason = f"footprints overlap by {area:.3g} m2, {share[row]:.0%} of the smaller one"
+        rejected.append(Rejection("pair", name, source, None, (reason,)))
+    clear = part.drop(index=overlaps.index).reset_index(drop=True)
+    repeated, lines = clear["repeated"].to_numpy(), np.arange(2, len(clear) + 2)
+    # Pairs have no line in the file
+    checked = checked_pairs(clear.drop(columns=_HELPERS), source, lines, repeated)
+    rejected += [row._replace(row=None) for row in checked.attrs["rejected"]]
+    checked.attrs = {}
+    return _with_contact(checked)
+
+
+def _with_buildings(pairs: pd.DataFrame, buildings: pd.DataFrame) -> pd.DataFrame:
+    """Return some pairs with the columns of both buildings, before any check."""
+    names = [*_PLACE, *buildings.columns.drop(_PLACE)]
+    sides = [_with_positions(pairs.reset_index(drop=True))]
+    for i, side in ((1, "first"), (2, "second")):
+        chosen = _with_height(buildings.iloc[pairs[side]][names].reset_index(drop=True))
+        # Columns of a pair, in notes too, have the number of the building
+        if NOTES in chosen:
+            notes, word = chosen[NOTES].fillna("").astype(str), r"(^|; )(\w+) = "
+            chosen[NOTES] = notes.str.replace(word, rf"\g<1>\g<2>_{i} = ", regex=True)
+        sides.append(chosen.add_suffix(f"_{i}"))
+    table = pd.concat(sides, axis=1)
+    # The notes on both buildings are those on the pair
+    if NOTES in buildings:
+        both = table.pop(f"{NOTES}_1") + "; " + table.pop(f"{NOTES}_2")
+        table[NOTES] = both.str.strip("; ")
+    return table
+
+
+def _with_height(buildings: pd.DataFrame) -> pd.DataFrame:
+    """Return buildings with missing heights from storeys and their given height."""
+    if "storey_height" not in buildings:
+        return buildings
+    unknown = pd.Series(np.nan, index=buildings.index)
+    storeys, height = (buildings.get(name, unknown) for name in ("storeys", "height"))
+    by_storeys = storeys * buildings["storey_height"]
+    return buildings.drop(columns="storey_height").assign(height=height.fillna(by_storeys))
+
+
+def _with_contact(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return checked pairs with contact height and floor offset where both buildings allow it."""
+    names = ("height_1", "storeys_1", "height_2", "storeys_2")
+    sizes = [numbers_in(pairs, name) for name in names]
+    # Floors are known where heights and storeys of both are; 1 is a placeholder elsewhere
+    is_known = ~np.isnan(sizes).any(axis=0)
+    offset = np.where(is_known, floor_offset(*np.where(is_known, sizes, 1.0)), np.nan)
+    pairs = pairs.assign(contact_height=np.minimum(sizes[0], sizes[2]), floor_offset=offset)
+    # Columns of the schema first, in its order
+    known = [name for name in COLUMNS if name in pairs]
+    return pairs[[*known, *pairs.columns.difference(known, sort=False)]]

@@ -6,51 +6,58 @@ suffix if its first bytes are those of such a file. GDAL would choose a driver b
 follow it to other files and addresses.
 """
 
+import gzip
 import json
 import re
 import sqlite3
 import warnings
-from collections.abc import Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet
-import shapely
-from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError, Rejection, TryLater, shortened
+from per_obspy.errors import CatalogError, TryLater, shortened
 from per_obspy.files import scratch_folder, unreadable_reason, writing
 from per_obspy.inventory.files.parquet import plain_columns
-from per_obspy.inventory.footprints.building_lists import read_list
+from per_obspy.inventory.footprints.citygml import read_citygml
+from per_obspy.inventory.footprints.csv_buildings import read_csv_buildings
 from per_obspy.inventory.footprints.gdal_paths import literal_path
-from per_obspy.inventory.importers.building_files import SUFFIXES, read_buildings
-from per_obspy.inventory.importers.importer import RawLayer as ImportedLayer
-from per_obspy.inventory.importers.nested_columns import without_nesting
+from per_obspy.inventory.footprints.json_buildings import (
+    is_asset_json,
+    read_asset_json,
+    read_geojson_lines,
+)
+from per_obspy.inventory.footprints.raw_layer import RawLayer
 from per_obspy.reader_process import BeyondLimits, Limits, read_layer_apart, require_own_drivers
 
-#: Files that GDAL reads; GeoParquet is read by pyarrow, lists of buildings by the reader of tables.
+#: Files that GDAL reads, and how they begin; those of JSON after blanks.
+_JSON = ("GeoJSON file", (b"{", b"["))
 GDAL_KINDS = {
-    ".gpkg": "GeoPackage",
-    ".geojson": "GeoJSON file",
-    ".json": "GeoJSON file",
-    ".shp": "Shapefile",
-    ".fgb": "FlatGeobuf file",
+    ".gpkg": ("GeoPackage", (b"SQLite format 3\x00",)),
+    ".geojson": _JSON,
+    ".json": _JSON,
+    ".shp": ("Shapefile", (b"\x00\x00\x27\x0a",)),
+    ".fgb": ("FlatGeobuf file", (b"fgb\x03fgb",)),
 }
 JSON_SUFFIXES = (".geojson", ".json")
-PARQUET_SUFFIXES = (".parquet", ".geoparquet")
-LIST_SUFFIXES = (".csv",)
+LINES = (".geojsonl", ".geojsons", ".jsonl", ".ndjson")
 
-#: How files that GDAL reads begin; those of JSON after blanks.
-_BEGINNINGS = {
-    ".gpkg": (b"SQLite format 3\x00",),
-    ".shp": (b"\x00\x00\x27\x0a",),
-    ".fgb": (b"fgb\x03fgb",),
-    **dict.fromkeys(JSON_SUFFIXES, (b"{", b"[")),
-}
+_PACKED = (".csv", *LINES)
+SUFFIXES = (
+    *(*GDAL_KINDS, ".parquet", ".geoparquet", ".csv", *LINES, ".gml", ".xml"),
+    *(".pbf", ".osm", ".gz"),
+)
+
+#: Columns of GDAL's layer of areas of OpenStreetMap; further tags are in ``other_tags``.
+_OSM_COLUMNS = ["osm_id", "osm_way_id", "name", "building", "other_tags"]
+
+#: Beginning of GDAL's message for a file whose nodes are not in the order of their numbers.
+_UNSORTED = "Non increasing node id"
 
 #: How SQLite keeps a table that holds its rows, and the index of places of one.
 _TABLE = re.compile(r"\s*CREATE\s+TABLE\b", re.IGNORECASE)
@@ -61,33 +68,9 @@ _PLACES = re.compile(
 #: Longest beginning of a GeoJSON file in which members of the collection are sought, bytes.
 HEAD = 1 << 20
 
-
-class RawLayer(NamedTuple):
-    """
-    A layer as its file has it.
-
-    Attributes
-    ----------
-    wkb : pa.ChunkedArray
-        Geometries as WKB; null where there is none.
-    attributes : pa.Table
-        One row per geometry.
-    crs : object
-        Coordinate reference system in any form; None if unknown.
-    numbers : (n,) ndarray of int
-        Number of each feature in the file, or line of a list.
-    faults : mapping of int to str
-        Position of a feature -> why it has no geometry, where that is known.
-    broken : tuple of Rejection
-        Lines of a list that are no rows.
-    """
-
-    wkb: pa.ChunkedArray
-    attributes: pa.Table
-    crs: Any
-    numbers: NDArray[np.int64]
-    faults: Mapping[int, str] = {}
-    broken: tuple[Rejection, ...] = ()
+#: Largest unpacked file, bytes: five million footprints of 800 bytes. Largest ratio of it to the
+#: packed file, from 64 MiB on: footprints as text have 5 to 20 (reasoned).
+LARGEST, LARGEST_RATIO, _SMALL = 4 << 30, 200, 64 << 20
 
 
 def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
@@ -97,7 +80,9 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     Parameters
     ----------
     file : Path
-        GeoPackage, GeoJSON, Shapefile, FlatGeobuf, GeoParquet or CSV.
+        GeoPackage, GeoJSON, Shapefile, FlatGeobuf, GeoParquet; CityGML (``.gml``, ``.xml``),
+        OpenStreetMap (``.osm``, ``.pbf``), assets of SimCenter (``.json``, ``.geojson``); CSV and
+        lines of GeoJSON, which may be packed by gzip.
     layer : str or None
         Name of the layer, for files that have several.
 
@@ -106,56 +91,157 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     CatalogError
         If the file is missing, or cannot be read as its suffix indicates.
     """
-    suffix = file.suffix.lower()
     if not file.exists():
         raise CatalogError(str(file), "no such file")
-    # GDAL knows further files, but not whether they hold footprints
-    known = (*GDAL_KINDS, *PARQUET_SUFFIXES, *LIST_SUFFIXES, *SUFFIXES)
-    if suffix not in known:
-        expected = ", ".join(known)
-        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
-    if not file.is_file():
-        raise CatalogError(str(file), "is no regular file")
-    if suffix in GDAL_KINDS:
-        _require_beginning(file, GDAL_KINDS[suffix])
+    _require_known(file)
+    if file.suffix.lower() in GDAL_KINDS:
+        _require_beginning(file)
+    # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
+    # of .osm.pbf (reasoned)
+    size = file.stat().st_size
+    limits = Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
     try:
-        found: RawLayer = read_layer_apart(_limits(file), _read, file, layer)
+        found: RawLayer = read_layer_apart(limits, _read, file, layer)
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
     return found
 
 
-def _limits(file: Path) -> Limits:
-    """
-    Return the limits of reading a layer.
+def _require_known(file: Path) -> None:
+    """Check the suffix of a file: GDAL knows others, but not whether they hold outlines."""
+    suffix, problem = file.suffix.lower(), ""
+    if suffix not in SUFFIXES:
+        problem = f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
+    elif not file.is_file():
+        problem = "is no regular file"
+    # Tables and lines may be packed
+    elif suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
+        expected = ", ".join(f"{name}.gz" for name in _PACKED)
+        problem = f"unknown suffix {file.name[-20:]!r}, expected {expected}"
+    if problem:
+        raise CatalogError(str(file), problem)
 
-    Reasoned: the areas of OpenStreetMap, the slowest, take 2 s for each MiB of ``.osm.pbf`` and 20
-    times its place in memory.
-    """
-    size = file.stat().st_size
-    return Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
+
+def _require_beginning(file: Path) -> None:
+    """Check the first bytes of a file for GDAL, and that no part of it is elsewhere."""
+    suffix = file.suffix.lower()
+    kind, beginnings = GDAL_KINDS[suffix]
+    with file.open("rb") as opened:
+        head = opened.read(HEAD)
+    if suffix in JSON_SUFFIXES:
+        head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not head.startswith(beginnings):
+        error = ValueError(f"it begins with {shortened(head[:20].decode('latin-1'))!r}")
+        raise CatalogError(str(file), unreadable_reason(file, kind, error))
+    # Parts of a file that is here are here too; a folder of links to all parts is one place
+    if suffix == ".shp" and not file.is_symlink():
+        for part in file.parent.iterdir():
+            if part.is_symlink() and part.stem == file.stem:
+                problem = f"its part {part.name} is a link that leads elsewhere"
+                raise CatalogError(str(file), problem)
 
 
 def _read(file: Path, layer: str | None) -> RawLayer:
     """Read a layer in the process of readers."""
+    try:
+        if file.suffix.lower() == ".gz":
+            with _unpacked(file) as plain:
+                return _read_plain(plain, str(file), layer)
+        return _read_plain(file, str(file), layer)
+    except TryLater:
+        raise
+    except OSError as error:
+        raise CatalogError(str(file), f"cannot be read: {error.strerror or error}") from error
+
+
+def _read_plain(file: Path, source: str, layer: str | None) -> RawLayer:
+    """Read an unpacked file; messages name its source."""
     suffix = file.suffix.lower()
-    if (buildings := read_buildings(file)) is not None:
-        return raw_features(buildings)
-    if suffix in LIST_SUFFIXES:
-        found = read_list(file)
-        # Positions of a list are degrees
-        return RawLayer(
-            found.wkb, found.attributes, "OGC:CRS84", found.lines, found.faults, found.broken
+    # Microsoft names lines of GeoJSON .csv
+    if suffix in LINES or (suffix == ".csv" and _first_character(file) == b"{"):
+        return read_geojson_lines(file, source)
+    if suffix in JSON_SUFFIXES and is_asset_json(file):
+        return read_asset_json(file, source)
+    if suffix in GDAL_KINDS:
+        return _read_gdal(file, layer)
+    readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
+    readers |= {".pbf": _read_osm, ".osm": _read_osm}
+    return readers.get(suffix, _read_geoparquet)(file, source)
+
+
+def _first_character(file: Path) -> bytes:
+    """Return the first character of a file that is no blank."""
+    with file.open("rb") as opened:
+        return opened.read(4096).lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+
+
+@contextmanager
+def _unpacked(file: Path) -> Iterator[Path]:
+    """Yield the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
+    ratio = max(LARGEST_RATIO * file.stat().st_size, _SMALL)
+    with scratch_folder() as folder:
+        plain, problem = folder / file.stem, ""
+        # Block by block, up to the limits
+        try:
+            with gzip.open(file) as packed, plain.open("wb") as copy:
+                while not problem and (block := packed.read(1 << 20)):
+                    copy.write(block)
+                    if copy.tell() > LARGEST:
+                        problem = f"it has more than {LARGEST >> 30} GiB unpacked: split the file"
+                    elif copy.tell() > ratio:
+                        problem = f"it unpacks to more than {LARGEST_RATIO} times its packed size"
+                        problem += ": unpack it by hand"
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise CatalogError(str(file), f"not a file packed by gzip: {error}") from error
+        # The copy is gone with its folder
+        if problem:
+            raise CatalogError(str(file), problem)
+        yield plain
+
+
+def _read_osm(file: Path, source: str) -> RawLayer:
+    """Read the areas of an extract that are buildings; GDAL keeps many nodes in a file."""
+    import pyogrio  # in the process of readers only
+
+    require_own_drivers(pyogrio.list_drivers())
+
+    def areas(path: Path, **options: str) -> Any:
+        # The stream of Arrow would not report the errors of this driver
+        return pyogrio.raw.read(
+            path,
+            layer="multipolygons",
+            columns=_OSM_COLUMNS,
+            where="building IS NOT NULL",
+            TAGS_FORMAT="JSON",
+            **options,
         )
-    return _read_gdal(file, layer) if suffix in GDAL_KINDS else _read_geoparquet(file)
+
+    try:
+        with (
+            warnings.catch_warnings(action="ignore", category=RuntimeWarning),
+            literal_path(file) as path,
+        ):
+            try:
+                meta, _, wkb, fields = areas(path)
+            except pyogrio.errors.FeatureError as error:
+                # The slower index takes nodes in any order
+                if not str(error).startswith(_UNSORTED):
+                    raise
+                meta, _, wkb, fields = areas(path, USE_CUSTOM_INDEXING="NO")
+    except (RuntimeError, ValueError, UnicodeDecodeError) as error:
+        problem = unreadable_reason(file, "OpenStreetMap file", error)
+        raise CatalogError(source, problem) from error
+    attributes = pa.table(dict(zip(meta["fields"], map(pa.array, fields), strict=True)))
+    geometry = pa.chunked_array([pa.array(wkb, pa.large_binary())])
+    return _raw_layer(source, geometry, attributes, meta["crs"])
 
 
 def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     """Read a layer with GDAL."""
     import pyogrio  # in the process of readers only
 
-    kind = GDAL_KINDS[file.suffix.lower()]
     require_own_drivers(pyogrio.list_drivers())
+    suffix = file.suffix.lower()
     try:
         # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
         with (
@@ -175,33 +261,13 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
         OSError,
         UnicodeDecodeError,
     ) as error:
-        raise CatalogError(str(file), unreadable_reason(file, kind, error)) from error
+        problem = unreadable_reason(file, GDAL_KINDS[suffix][0], error)
+        raise CatalogError(str(file), problem) from error
     # Messages of GDAL, except for a reference system that it does not know
-    is_json = file.suffix.lower() in JSON_SUFFIXES
-    crs = (_declared_system(file) if is_json else None) or meta["crs"]
+    crs = (_declared_system(file) if suffix in JSON_SUFFIXES else None) or meta["crs"]
     geometry = table.column_names[-1]
     fields = [str(name) for name in meta["fields"]]
-    return _raw_layer(file, table[geometry], table.select(fields), crs)
-
-
-def _require_beginning(file: Path, kind: str) -> None:
-    """Check the first bytes of a file for GDAL, and that no part of it is elsewhere."""
-    suffix = file.suffix.lower()
-    with file.open("rb") as opened:
-        head = opened.read(HEAD)
-    if suffix in JSON_SUFFIXES:
-        head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if not head.startswith(_BEGINNINGS[suffix]):
-        text = shortened(head[:20].decode("latin-1"))
-        error = ValueError(f"it begins with {text!r}")
-        raise CatalogError(str(file), unreadable_reason(file, kind, error))
-    # Parts of a file that is here are here too; a folder of links to all parts is one place
-    if suffix == ".shp" and not file.is_symlink():
-        for part in file.parent.iterdir():
-            if part.is_symlink() and part.stem == file.stem:
-                raise CatalogError(
-                    str(file), f"its part {part.name} is a link that leads elsewhere"
-                )
+    return _raw_layer(str(file), table[geometry], table.select(fields), crs)
 
 
 @contextmanager
@@ -216,34 +282,34 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
         yield file, set()
         return
     with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as package:
-        foreign = _views(package)
-        _require_stored(file, package, foreign)
+        foreign = _foreign(file, package)
         # Only a package that has some is copied
-        if foreign:
-            with scratch_folder() as folder:
-                copy = folder / "layer.gpkg"
-                with writing(copy), closing(sqlite3.connect(copy)) as target:
-                    package.backup(target)
-                    _remove(target, foreign)
-                yield copy, foreign
+        if not foreign:
+            yield file, foreign
             return
-    yield file, foreign
+        with scratch_folder() as folder:
+            copy = folder / "layer.gpkg"
+            with writing(copy), closing(sqlite3.connect(copy)) as target:
+                package.backup(target)
+                _remove(target, foreign)
+            yield copy, foreign
 
 
-def _views(package: sqlite3.Connection) -> set[str]:
-    """Return the views and virtual tables of a database but for the index of places."""
-    entries = package.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('view', 'table')")
-    return {name for name, sql in entries if sql and not (_TABLE.match(sql) or _PLACES.match(sql))}
-
-
-def _require_stored(file: Path, package: sqlite3.Connection, foreign: set[str]) -> None:
-    """Refuse tables whose columns are computed: by functions that may do anything."""
-    tables = package.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
-    for (table,) in tables:
-        columns = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
-        for (column,) in () if table in foreign else package.execute(columns, (table,)):
+def _foreign(file: Path, package: sqlite3.Connection) -> set[str]:
+    """Return views and virtual tables but for the index of places; refuse computed columns."""
+    search = "SELECT type, name, sql FROM sqlite_master WHERE type IN ('view', 'table')"
+    foreign, tables = set[str](), list[str]()
+    for kind, name, sql in package.execute(search).fetchall():
+        tables += [name] if kind == "table" else []
+        if sql and not (_TABLE.match(sql) or _PLACES.match(sql)):
+            foreign.add(name)
+    # Functions that compute a column may do anything
+    for table in (name for name in tables if name not in foreign):
+        computed = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
+        for (column,) in package.execute(computed, (table,)):
             problem = f"column {column} of table {table} is computed, expected a stored one"
             raise CatalogError(str(file), problem)
+    return foreign
 
 
 def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
@@ -258,32 +324,27 @@ def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
     package.commit()
 
 
-def raw_features(buildings: ImportedLayer) -> RawLayer:
-    """Return the buildings of an importer's reader as a layer."""
-    shapes = buildings.geometries.copy()
-    shapes[list(buildings.faults)] = None
-    wkb = pa.chunked_array([pa.array(shapely.to_wkb(shapes), pa.large_binary())])
-    # Cells of JSON may be numbers and texts in one column
-    columns = {}
-    for name in buildings.attributes:
-        cells = buildings.attributes[name]
-        is_mixed = pd.api.types.infer_dtype(cells, skipna=True).startswith("mixed")
-        columns[str(name)] = pa.array(cells.astype(str).where(cells.notna()) if is_mixed else cells)
-    numbers = np.arange(1, len(wkb) + 1)
-    return RawLayer(wkb, pa.table(columns), buildings.crs, numbers, dict(buildings.faults))
-
-
-def _raw_layer(file: Path, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
-    """Return a layer whose attributes are plain columns with unique names."""
-    names = attributes.column_names
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise CatalogError(str(file), f"column {repeated[0]} occurs more than once")
-    # Text that is not UTF-8 is refused
-    plain, faults = plain_columns(attributes.replace_schema_metadata(None))
-    for row, fault in faults.items():
-        raise CatalogError(str(file), f"feature {row + 1}: {fault}")
-    return RawLayer(wkb, plain, crs, np.arange(1, len(wkb) + 1))
+def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
+    """Return the requested one of the layers and their geometries, or the only one with them."""
+    kinds = {str(name): kind for name, kind in layers}
+    names = ", ".join(kinds) or "none"
+    # A layer without geometries is a table
+    spatial = [name for name, kind in kinds.items() if kind is not None]
+    # A view may be what the user means
+    if layer in views or (views and layer is None and not any(kinds.values())):
+        shown = layer or ", ".join(sorted(views))
+        problem = f"layer {shown} is a view, which may have no end: save it as a table"
+    elif layer is not None and layer not in kinds:
+        problem = f"no layer {layer!r} (layers found: {names})"
+    elif layer is not None:
+        return layer
+    elif not spatial:
+        problem = f"no layer has geometries (layers found: {names})"
+    elif len(spatial) > 1:
+        problem = f"several layers, name one: {', '.join(spatial)}"
+    else:
+        return spatial[0]
+    raise CatalogError(str(file), problem)
 
 
 def _declared_system(file: Path) -> str | None:
@@ -321,59 +382,81 @@ def _members(file: Path) -> dict[str, Any]:
     return found
 
 
-def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
-    """Return the requested one of the layers and their geometries, or the only one with them."""
-    kinds = {str(name): kind for name, kind in layers}
-    # A view may be what the user means
-    if layer in views or (views and layer is None and not any(kinds.values())):
-        shown = layer or ", ".join(sorted(views))
-        problem = f"layer {shown} is a view, which may have no end: save it as a table"
-        raise CatalogError(str(file), problem)
-    if layer is not None:
-        if layer not in kinds:
-            raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")
-        return layer
-    # A layer without geometries is a table
-    spatial = [name for name, kind in kinds.items() if kind is not None]
-    if not spatial:
-        found = ", ".join(kinds) or "none"
-        raise CatalogError(str(file), f"no layer has geometries (layers found: {found})")
-    if len(spatial) > 1:
-        raise CatalogError(str(file), f"several layers, name one: {', '.join(spatial)}")
-    return spatial[0]
-
-
-def _read_geoparquet(file: Path) -> RawLayer:
+def _read_geoparquet(file: Path, source: str) -> RawLayer:
     """Read a GeoParquet file."""
     try:
-        table = without_nesting(pa.parquet.read_table(file.absolute()))
+        table = _without_nesting(pa.parquet.read_table(file.absolute()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
-    # GeoParquet is described by JSON in the metadata
-    described = (table.schema.metadata or {}).get(b"geo")
-    if described is None:
-        raise CatalogError(
-            str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints"
-        )
-    name, crs = _geometry_column(file, table, described)
-    return _raw_layer(file, table[name], table.drop_columns([name]), crs)
+        raise CatalogError(source, unreadable_reason(file, "Parquet table", error)) from error
+    name, crs = _geometry_column(source, table)
+    return _raw_layer(source, table[name], table.drop_columns([name]), crs)
 
 
-def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str, Any]:
+def _geometry_column(source: str, table: pa.Table) -> tuple[str, Any]:
     """Return name and coordinate reference system of the primary geometry column."""
+    # GeoParquet is described by JSON in the metadata
+    metadata, problem = table.schema.metadata or {}, "wrong GeoParquet metadata:"
+    if b"geo" not in metadata:
+        problem = "no GeoParquet metadata: a table of pairs is no layer of footprints"
+        raise CatalogError(source, problem)
     try:
-        geo = json.loads(described)
+        geo = json.loads(metadata[b"geo"])
         name = geo["primary_column"]
-        column = geo["columns"][name]
-        encoding, kind = column.get("encoding"), table[name].type
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        problem = f"wrong GeoParquet metadata: {type(error).__name__} {error}"
-        raise CatalogError(str(file), problem) from error
-    if encoding != "WKB":
-        raise CatalogError(str(file), f"geometries are encoded as {encoding!r}, expected WKB")
-    if not (pa.types.is_binary(kind) or pa.types.is_large_binary(kind)):
-        raise CatalogError(
-            str(file), f"wrong GeoParquet metadata: column {name} is {kind}, not bytes"
-        )
-    # A missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
-    return name, column.get("crs", "OGC:CRS84")
+        # A missing CRS means OGC:CRS84 by the specification, an explicit null means unknown
+        column = {"encoding": None, "crs": "OGC:CRS84", **geo["columns"][name]}
+        kind = table[name].type
+    except (KeyError, TypeError, ValueError) as error:
+        raise CatalogError(source, f"{problem} {type(error).__name__} {error}") from error
+    if column["encoding"] != "WKB":
+        problem = f"geometries are encoded as {column['encoding']!r}, expected WKB"
+        raise CatalogError(source, problem)
+    if kind not in (pa.binary(), pa.large_binary()):
+        raise CatalogError(source, f"{problem} column {name} is {kind}, not bytes")
+    return name, column["crs"]
+
+
+def _without_nesting(table: pa.Table) -> pa.Table:
+    """
+    Return a table with the nested columns of Overture Maps as text, without bounding boxes.
+
+    ``names`` becomes its field ``primary``, ``sources`` the ``dataset`` of its first row, a map, as
+    tags are, a text of JSON.
+    """
+    for field in table.schema:
+        name, kind = field.name, field.type
+        fields = {part.name for part in kind} if pa.types.is_struct(kind) else set()
+        # The geometry gives the box anyway
+        if fields >= {"xmin", "ymin", "xmax", "ymax"}:
+            table = table.drop_columns([name])
+        elif name == "names" and "primary" in fields:
+            table = _as_texts(table, name, lambda row: row["primary"])
+        elif name == "sources" and pa.types.is_list(kind):
+            table = _as_texts(table, name, _first_dataset)
+        elif pa.types.is_map(kind):
+            table = _as_texts(table, name, lambda tags: json.dumps(dict(tags)))
+    return table
+
+
+def _first_dataset(rows: list[Any]) -> object:
+    """Return the data set of the first of several sources, None if it has none."""
+    return rows[0].get("dataset") if rows and isinstance(rows[0], dict) else None
+
+
+def _as_texts(table: pa.Table, name: str, value: Callable[[Any], object]) -> pa.Table:
+    """Return a table in which a column of nested cells is text."""
+    values = [None if cell is None else value(cell) for cell in table[name].to_pylist()]
+    texts = pa.array([None if each is None else str(each) for each in values], pa.string())
+    return table.set_column(table.column_names.index(name), name, texts)
+
+
+def _raw_layer(source: str, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
+    """Return a layer whose attributes are plain columns with unique names."""
+    names = attributes.column_names
+    repeated = [name for name in names if names.count(name) > 1]
+    if repeated:
+        raise CatalogError(source, f"column {repeated[0]} occurs more than once")
+    # Text that is not UTF-8 is refused
+    plain, faults = plain_columns(attributes.replace_schema_metadata(None))
+    for row, fault in faults.items():
+        raise CatalogError(source, f"feature {row + 1}: {fault}")
+    return RawLayer(wkb, plain, crs, np.arange(1, len(wkb) + 1))

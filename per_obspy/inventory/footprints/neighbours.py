@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.footprints.layers import Geometries
+from per_obspy.inventory.footprints.raw_layer import Geometries
 
 IntArray = NDArray[np.int64]
 
@@ -27,6 +27,8 @@ FACING_DEPTH = 0.25
 
 #: Largest angle between facing walls, degrees.
 FACING_ANGLE = 30.0
+
+_ANTIPARALLEL = -np.cos(np.deg2rad(FACING_ANGLE))
 
 #: Largest angle between the axis and the direction of a neighbour that continues the row, degrees.
 ROW_ANGLE = 45.0
@@ -79,19 +81,6 @@ class Neighbours(NamedTuple):
     azimuth: FloatArray
     inside_1: NDArray[np.bool_]
     inside_2: NDArray[np.bool_]
-
-    def rows(self, rows: slice) -> "Neighbours":
-        """Return some of the pairs."""
-        return Neighbours(
-            self.first[rows],
-            self.second[rows],
-            self.gap[rows],
-            self.overlap[rows],
-            self.facing_length[rows],
-            self.azimuth[rows],
-            self.inside_1[rows],
-            self.inside_2[rows],
-        )
 
 
 class _Walls(NamedTuple):
@@ -164,7 +153,10 @@ def _measured(
     near = gap <= distance
     one, other, gap = one[near], other[near], np.where(gap < TOUCHING, 0.0, gap)[near]
     facing, azimuth = _axis(polygons, one, other, gap)
-    overlap = _overlap(polygons, one, other, gap)
+    # Area covered by both
+    overlap, touch = np.zeros(gap.size), gap == 0.0
+    shared = shapely.intersection(polygons[one[touch]], polygons[other[touch]])
+    overlap[touch] = shapely.area(shared)
     return np.stack([first[near], second[near]]), np.stack([gap, overlap, facing, azimuth])
 
 
@@ -179,25 +171,13 @@ def _axis(
     return facing, np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
 
 
-def _overlap(
-    polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
-) -> FloatArray:
-    """Return the area covered by both footprints of each pair, m2."""
-    overlap, touch = np.zeros(gap.size), gap == 0.0
-    shared = shapely.intersection(polygons[first[touch]], polygons[second[touch]])
-    overlap[touch] = shapely.area(shared)
-    return overlap
-
-
 def _connection(first: Geometries, second: Geometries, gap: FloatArray) -> FloatArray:
     """Return the shortest connection of each pair; if they touch, the line between the centres."""
     line = shapely.get_coordinates(shapely.shortest_line(first, second)).reshape(-1, 2, 2)
     # A shortest line of length 0 has no direction
     centre_1 = shapely.get_coordinates(shapely.centroid(first))
     centre_2 = shapely.get_coordinates(shapely.centroid(second))
-    between_walls, between_centres = line[:, 1] - line[:, 0], centre_2 - centre_1
-    connection: FloatArray = np.where(gap[:, None] > 0.0, between_walls, between_centres)
-    return connection
+    return np.asarray(np.where(gap[:, None] > 0.0, line[:, 1] - line[:, 0], centre_2 - centre_1))
 
 
 def _walls(polygons: Geometries) -> _Walls:
@@ -221,16 +201,17 @@ def _facing(
     walls, bounds = _walls(polygons), shapely.bounds(polygons)
     # Combinations of walls that come near the other building
     reach = gap + FACING_DEPTH
-    near_1 = _near(walls, first, bounds[second], reach)
-    near_2 = _near(walls, second, bounds[first], reach)
-    pair, wall_1, wall_2 = _combined(near_1, near_2, reach.size)
+    pair_1, near_1 = _near(walls, first, bounds[second], reach)
+    pair_2, near_2 = _near(walls, second, bounds[first], reach)
+    counts = np.bincount(pair_2, minlength=reach.size)
+    starts = np.cumsum(counts) - counts
+    row_1, row_2 = _expanded(starts[pair_1], counts[pair_1])
+    pair, wall_1, wall_2 = pair_1[row_1], near_1[row_1], near_2[row_2]
     # Sums over the combinations of each pair
     shared, normal = _facing_walls(walls, wall_1, wall_2, reach[pair])
+    east, north = (np.bincount(pair, shared * each, minlength=reach.size) for each in normal.T)
     length = np.bincount(pair, shared, minlength=reach.size)
-    axis = np.zeros((reach.size, 2))
-    for i in (0, 1):
-        axis[:, i] = np.bincount(pair, shared * normal[:, i], minlength=reach.size)
-    return np.asarray(length, dtype=np.float64), axis
+    return np.asarray(length, dtype=np.float64), np.column_stack([east, north])
 
 
 def _expanded(starts: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
@@ -254,36 +235,25 @@ def _near(
     return pair[is_near], wall[is_near]
 
 
-def _combined(
-    near_1: tuple[IntArray, IntArray], near_2: tuple[IntArray, IntArray], n_pairs: int
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return pair and both walls of every combination of walls of the two buildings of a pair."""
-    (pair_1, wall_1), (pair_2, wall_2) = near_1, near_2
-    counts = np.bincount(pair_2, minlength=n_pairs)
-    starts = np.cumsum(counts) - counts
-    row_1, row_2 = _expanded(starts[pair_1], counts[pair_1])
-    return pair_1[row_1], wall_1[row_1], wall_2[row_2]
-
-
 def _facing_walls(
     walls: _Walls, wall_1: IntArray, wall_2: IntArray, reach: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return shared lengths of facing walls, m, 0 for others, and normals out of first walls."""
     along, normal, length = _directions(walls, wall_1)
     # Second wall seen from the start of the first
-    begin = walls.start[wall_2] - walls.start[wall_1]
-    end = walls.end[wall_2] - walls.start[wall_1]
-    along_begin, along_end = _dot(begin, along), _dot(end, along)
+    begin, end = (ends[wall_2] - walls.start[wall_1] for ends in walls[1:])
+    along_begin, along_end, wall = _dot(begin, along), _dot(end, along), end - begin
     # Length that both share, where the second wall runs against the first
-    low = np.maximum(0.0, np.minimum(along_begin, along_end))
-    high = np.minimum(length, np.maximum(along_begin, along_end))
-    is_antiparallel = _antiparallel(begin, end, along_end - along_begin)
+    low = np.minimum(along_begin, along_end).clip(min=0.0)
+    high = np.maximum(along_begin, along_end).clip(max=length)
+    advance = along_end - along_begin
+    is_facing = advance < _ANTIPARALLEL * np.hypot(*wall.T)
     # Distance of the second wall at the middle of the shared length
     to_middle = (low + high) / 2.0 - along_begin
-    share = _ratio(to_middle, along_end - along_begin, is_antiparallel)
-    distance = _dot(begin + share[:, None] * (end - begin), normal)
-    is_near = (distance >= -FACING_DEPTH) & (distance <= reach)
-    return np.where(is_antiparallel & (high > low) & is_near, high - low, 0.0), normal
+    share = np.divide(to_middle, advance, out=np.zeros_like(advance), where=is_facing)
+    distance = _dot(begin + share[:, None] * wall, normal)
+    is_facing &= (high > low) & (distance >= -FACING_DEPTH) & (distance <= reach)
+    return np.where(is_facing, high - low, 0.0), normal
 
 
 def _directions(walls: _Walls, wall: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -294,20 +264,9 @@ def _directions(walls: _Walls, wall: IntArray) -> tuple[FloatArray, FloatArray, 
     return along, np.column_stack([along[:, 1], -along[:, 0]]), length
 
 
-def _antiparallel(begin: FloatArray, end: FloatArray, advance: FloatArray) -> NDArray[np.bool_]:
-    """Return walls that run against a direction, from their ends and their advance along it, m."""
-    length = np.hypot(*(end - begin).T)
-    return np.asarray(advance < -np.cos(np.deg2rad(FACING_ANGLE)) * length)
-
-
 def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the scalar product of each row."""
     return np.asarray(np.sum(first * second, axis=1))
-
-
-def _ratio(part: FloatArray, whole: FloatArray, where: NDArray[np.bool_]) -> FloatArray:
-    """Return part / whole in the rows of a mask, 0 in others."""
-    return np.divide(part, whole, out=np.zeros_like(part), where=where)
 
 
 def _inside_row(

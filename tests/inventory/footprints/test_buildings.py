@@ -1,4 +1,4 @@
-"""Buildings of a layer, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
+"""Buildings of a layer: repetitions, places, the file that goes with the pairs."""
 
 import json
 
@@ -13,7 +13,7 @@ import shapely
 from per_obspy import pairs_from_footprints
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.footprints import buildings as module
-from per_obspy.inventory.footprints import footprint_rows
+from per_obspy.inventory.footprints import footprint_pairs
 from per_obspy.inventory.footprints.buildings import without_repetitions, write_buildings
 from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
 from per_obspy.inventory.footprints.layers import polygons, read_layer
@@ -66,7 +66,7 @@ def test_the_file_of_buildings_is_a_layer_that_gives_the_same_pairs(town, tmp_pa
 
 def test_blocks_do_not_change_the_pairs(town, monkeypatch):
     whole = pairs_from_footprints(town)
-    monkeypatch.setattr(footprint_rows, "CHUNK", 2)
+    monkeypatch.setattr(footprint_pairs, "CHUNK", 2)
     monkeypatch.setattr(module, "BLOCK", 2)
     pd.testing.assert_frame_equal(pairs_from_footprints(town), whole)
     assert whole["position_1"].tolist() == ["end", "inside", "inside", "inside", "inside"]
@@ -87,7 +87,7 @@ def test_repetitions_far_apart_are_found_whatever_the_first_point(monkeypatch):
 
 def test_names_of_pairs_that_repeat_in_another_block_are_rejected(tmp_path, monkeypatch):
     # a/b + c and a + b/c have one name
-    monkeypatch.setattr(footprint_rows, "CHUNK", 1)
+    monkeypatch.setattr(footprint_pairs, "CHUNK", 1)
     path = tmp_path / "town.gpkg"
     near = [HOUSES[0], HOUSES[1], HOUSES[3], HOUSES[4]]
     names = np.array(["a/b", "c", "a", "b/c"], dtype=object)

@@ -10,20 +10,19 @@ Source: OGC 12-019, City Geography Markup Language 2.0; OGC 08-038r7 on the orde
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyproj
 import shapely
 from lxml import etree
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.importers.importer import RawLayer
+from per_obspy.inventory.footprints.raw_layer import RawLayer, cell_table, features
 
 #: Namespaces of buildings; version 3.0 is another model.
-_BUILDINGS = tuple(f"{{http://www.opengis.net/citygml/building/{each}}}" for each in ("2.0", "1.0"))
-_VERSION_3 = "{http://www.opengis.net/citygml/building/3.0}Building"
+_MODEL = "{{http://www.opengis.net/citygml/building/{}}}Building"
+_BUILDINGS, _VERSION_3 = (_MODEL.format("2.0"), _MODEL.format("1.0")), _MODEL.format("3.0")
 
 #: Elements of outlines in the order of preference: walls at the ground, then the edge of the roof.
 OUTLINES = ("lod0FootPrint", "lod0RoofEdge", "GroundSurface", "lod1Solid", "lod1MultiSurface")
@@ -40,14 +39,6 @@ _MOST_NUMBERS = 300_000
 #: Least area of a surface from above over the square of its circumference: walls have rounding
 #: errors only, and a passage of 1 m by 1 km has 2.5e-4.
 _FLAT = 1e-6
-
-
-class _Building(NamedTuple):
-    """Outline in the coordinates of the file, kind of the outline, attributes."""
-
-    outline: Any
-    cells: dict[str, object]
-    fault: str
 
 
 def read_citygml(file: Path, source: str) -> RawLayer:
@@ -67,33 +58,37 @@ def read_citygml(file: Path, source: str) -> RawLayer:
         If the file is no such document, has a type definition, no buildings, or no reference
         system.
     """
-    systems = list[str]()
+    systems, rows = list[str](), list[dict[str, object]]()
+    outlines, faults = list[Any](), dict[int, str]()
     try:
-        buildings = [_building(element) for element in _elements(file, source, systems)]
+        for element in _elements(file, source, systems):
+            cells, fault = _attributes(element)
+            outline, cells["outline"], wrong = _outline(element)
+            # A building with a fault loses its outline only
+            if fault or wrong:
+                faults[len(rows)] = fault or wrong
+            outlines.append(outline)
+            rows.append(cells)
     except (etree.XMLSyntaxError, UnicodeDecodeError) as error:
         raise CatalogError(source, f"not a CityGML file: {str(error)[:200]}") from error
-    if not buildings:
+    if not rows:
         raise CatalogError(source, "not a CityGML file: no bldg:Building of 1.0 or 2.0")
     # Coordinates east first
     crs, is_north_first = _reference_system(systems, source)
-    shapes = np.array([building.outline for building in buildings], dtype=object)
+    shapes = np.array(outlines, dtype=object)
     if is_north_first:
         shapes = shapely.transform(shapes, np.fliplr)
-    faults = {row: building.fault for row, building in enumerate(buildings) if building.fault}
-    table = pd.DataFrame([building.cells for building in buildings], dtype=object)
-    return RawLayer(shapes, table.infer_objects(), crs, faults)
+    return features(shapes, cell_table(rows), crs, faults)
 
 
 def _elements(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
     """Yield the buildings of a document, and add the names of its reference systems."""
-    tags = [f"{space}Building" for space in _BUILDINGS]
-    wanted = (*tags, _VERSION_3, "{*}Envelope")
     with file.open("rb") as opened:
         # No entity, no address, no unlimited text
         parser = etree.iterparse(
             opened,
             events=("start", "end"),
-            tag=wanted,
+            tag=(*_BUILDINGS, _VERSION_3, "{*}Envelope"),
             resolve_entities=False,
             load_dtd=False,
             no_network=True,
@@ -106,17 +101,13 @@ def _elements(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
                 raise CatalogError(source, "CityGML 3.0 is not read, 1.0 and 2.0 are")
             if event == "start":
                 systems.extend(filter(None, [element.get("srsName")]))
-            elif element.tag in tags:
+            elif element.tag in _BUILDINGS:
                 yield element
-                _forget(element)
-
-
-def _forget(element: Any) -> None:
-    """Free the memory of a building and of all elements before it."""
-    element.clear()
-    member = element.getparent()
-    while member is not None and member.getprevious() is not None:
-        del member.getparent()[0]
+                # Free the memory of the building and of all elements before it
+                element.clear()
+                member = element.getparent()
+                while member is not None and member.getprevious() is not None:
+                    del member.getparent()[0]
 
 
 def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
@@ -127,57 +118,46 @@ def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
     if other := next((each for each in names if each != name), None):
         raise CatalogError(source, f"two reference systems, {name:.60} and {other:.60}")
     # Official names, and others that the library of projections knows
-    found = _EPSG.search(name)
+    official = _EPSG.search(name)
     try:
-        crs = (
-            pyproj.CRS.from_epsg(int(found["code"])) if found else pyproj.CRS.from_user_input(name)
-        )
+        crs = pyproj.CRS.from_user_input(int(official["code"]) if official else name)
     except pyproj.exceptions.CRSError as error:
         problem = f"unknown coordinate reference system {name!r:.80}"
         raise CatalogError(source, problem) from error
     # Heights use a separate reference system
     horizontal = crs.sub_crs_list[0] if crs.is_compound else crs.to_2d()
-    is_short = name.upper().startswith("EPSG:")
     directions = [axis.direction for axis in horizontal.axis_info]
-    return horizontal, not is_short and directions[:1] == ["north"]
-
-
-def _building(element: Any) -> _Building:
-    """Return a building of the document."""
-    cells, fault = _attributes(element)
-    # Outline of the building or of its parts
-    try:
-        outline, cells["outline"] = _outline(element)
-    except (ValueError, shapely.errors.GEOSException) as error:
-        return _Building(None, cells | {"outline": None}, fault or f"outline: {str(error)[:80]}")
-    return _Building(outline, cells, fault)
+    return horizontal, not name.upper().startswith("EPSG:") and directions[:1] == ["north"]
 
 
 def _attributes(element: Any) -> tuple[dict[str, object], str]:
     """Return the attributes of a building, and the fault of its unit of height if there is one."""
-    space = etree.QName(element).namespace
-    height, unit = _text(element, space, "measuredHeight")
+    height, unit = _text(element, "measuredHeight")
     # Units may be names in a dictionary, such as urn:ogc:def:uom:UCUM::m or #m
     factor = _UNITS.get(unit.lower().rpartition("#")[2].rpartition(":")[2])
     cells: dict[str, object] = {
         "id": next(iter(element.xpath("@*[local-name()='id']")), None),
         "measuredHeight": _number(height, factor or 1.0),
-        "storeysAboveGround": _number(_text(element, space, "storeysAboveGround")[0], 1.0),
-        "usage": _text(element, space, "usage")[0],
-        "structure_type": _anywhere(element, "buildingStructureType"),
-        "address": _anywhere(element, "LocalityName"),
+        "storeysAboveGround": _number(_text(element, "storeysAboveGround")[0], 1.0),
+        "usage": _text(element, "usage")[0],
+        "structure_type": _short(next(element.iter("{*}buildingStructureType"), None)),
+        "address": _short(next(element.iter("{*}LocalityName"), None)),
     }
     return cells, "" if factor else f"measuredHeight has the unit {unit!r:.40}, expected m"
 
 
-def _text(element: Any, space: str, name: str) -> tuple[str | None, str]:
+def _text(element: Any, name: str) -> tuple[str | None, str]:
     """Return the text of a child, of parts where the building itself has none, and its unit."""
-    found = element.find(f"{{{space}}}{name}")
-    if found is None:
-        found = element.find(f"{{{space}}}consistsOfBuildingPart//{{{space}}}{name}")
-    if found is None:
-        return None, ""
-    return (found.text or "").strip()[:200] or None, found.get("uom") or ""
+    space = f"{{{etree.QName(element).namespace}}}"
+    child = element.find(f"{space}{name}")
+    if child is None:
+        child = element.find(f"{space}consistsOfBuildingPart//{space}{name}")
+    return _short(child), "" if child is None else child.get("uom") or ""
+
+
+def _short(element: Any) -> str | None:
+    """Return the text of an element, None if it is missing or empty."""
+    return None if element is None else (element.text or "").strip()[:200] or None
 
 
 def _number(text: str | None, factor: float) -> object:
@@ -188,62 +168,43 @@ def _number(text: str | None, factor: float) -> object:
         return text
 
 
-def _anywhere(element: Any, name: str) -> str | None:
-    """Return the text of the first element of a name below the building."""
-    found = next(element.iter(f"{{*}}{name}"), None)
-    return None if found is None else (found.text or "").strip()[:200] or None
+def _outline(element: Any) -> tuple[Any, str | None, str]:
+    """Return the outline of a building or its parts, the element that gives it, and its fault."""
+    try:
+        for name in OUTLINES:
+            tops = element.iter(f"{{*}}{name}")
+            shapes = [_polygon(each) for top in tops for each in top.iter("{*}Polygon")]
+            # Walls of a block are lines from above
+            flat = [shape for shape in shapes if shape.area > _FLAT * shape.length**2]
+            if flat:
+                return flat[0] if len(flat) == 1 else shapely.union_all(flat), name, ""
+    except (ValueError, shapely.errors.GEOSException) as error:
+        return None, None, f"outline: {str(error)[:80]}"
+    return None, None, ""
 
 
-def _outline(element: Any) -> tuple[Any, str | None]:
-    """
-    Return the outline of a building and the element from which it comes, None if it has none.
-
-    Raises
-    ------
-    ValueError
-        If its coordinates are no numbers.
-    """
-    for name in OUTLINES:
-        tops = element.iter(f"{{*}}{name}")
-        rings = [_polygon(each) for top in tops for each in top.iter("{*}Polygon")]
-        # Walls of a block are lines from above
-        flat = [ring for ring in rings if ring is not None and ring.area > _FLAT * ring.length**2]
-        if flat:
-            return (flat[0] if len(flat) == 1 else shapely.union_all(flat)), name
-    return None, None
-
-
-def _polygon(element: Any) -> Any:
-    """Return a polygon as seen from above, None if it has no exterior ring."""
-    shells = [_ring(each) for each in element.findall("{*}exterior")]
-    if not shells or len(shells[0]) < 4:
-        return None
-    holes = [ring for each in element.findall("{*}interior") if len(ring := _ring(each)) >= 4]
-    return shapely.Polygon(shells[0], holes)
+def _polygon(element: Any) -> shapely.Polygon:
+    """Return a polygon as seen from above, empty if it has no exterior ring."""
+    shell, *_ = [*map(_ring, element.findall("{*}exterior")), ()]
+    holes = [ring for ring in map(_ring, element.findall("{*}interior")) if len(ring) >= 4]
+    return shapely.Polygon(shell, holes) if len(shell) >= 4 else shapely.Polygon()
 
 
 def _ring(element: Any) -> Any:
     """Return the first two coordinates of the corners of a ring."""
-    lists = [each.text or "" for each in element.iter("{*}posList")]
-    lists += [each.text or "" for each in element.iter("{*}pos")]
-    numbers = np.array(" ".join(lists).split()[: _MOST_NUMBERS + 1], dtype=np.float64)
+    # Numbers as text
+    lists = [*element.iter("{*}posList"), *element.iter("{*}pos")]
+    texts = " ".join(each.text or "" for each in lists).split()
+    numbers = np.array(texts[: _MOST_NUMBERS + 1], dtype=np.float64)
     if numbers.size > _MOST_NUMBERS:
         raise ValueError(f"a ring has more than {_MOST_NUMBERS} numbers")
-    # Corners of two or three numbers
     if not np.isfinite(numbers).all():
         raise ValueError("a coordinate is not finite")
-    dimension = _dimension(element)
+    # Corners of two numbers where the nearest declaration says so, else of three
+    own = element.iterfind(".//{*}posList[@srsDimension]")
+    above = (each for each in element.iterancestors() if each.get("srsDimension"))
+    declared = next(own, next(above, None))
+    dimension = 2 if declared is not None and declared.get("srsDimension") == "2" else 3
     if numbers.size % dimension:
         raise ValueError(f"{numbers.size} numbers are not a multiple of {dimension}")
     return numbers.reshape(-1, dimension)[:, :2]
-
-
-def _dimension(element: Any) -> int:
-    """Return the numbers per corner: 2 if the nearest declaration gives 2 dimensions, else 3."""
-    declared = next(element.iterfind(".//{*}posList[@srsDimension]"), None)
-    if declared is not None:
-        return 2 if declared.get("srsDimension") == "2" else 3
-    for above in element.iterancestors():
-        if above.get("srsDimension"):
-            return 2 if above.get("srsDimension") == "2" else 3
-    return 3

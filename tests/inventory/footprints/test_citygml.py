@@ -1,13 +1,10 @@
-"""
-City models: outlines by level of detail, order of axes, units; hostile documents.
-
-Covers per_obspy.inventory.importers.sources.plateau.
-"""
+"""City models: outlines by level of detail, order of axes, units; hostile documents."""
 
 import numpy as np
 import pytest
 import shapely
 from building_samples import (
+    geometries,
     gml_building,
     gml_document,
     gml_polygon,
@@ -18,8 +15,8 @@ from building_samples import (
 )
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.importers.citygml import read_citygml
-from per_obspy.inventory.importers.recognition import imported
+from per_obspy.inventory.footprints.building_columns import schema_columns
+from per_obspy.inventory.footprints.citygml import read_citygml
 
 HOUSE = shapely.box(139.7, 35.5, 139.7001, 35.5001)
 
@@ -40,10 +37,10 @@ def test_latitude_comes_first_and_both_levels_give_one_outline(tmp_path):
     for write in (plateau_lod0, plateau_lod1):
         raw = read_citygml(write(tmp_path, town), "town.gml")
         # would catch axes taken as longitude, latitude
-        assert shapely.bounds(raw.geometries) == pytest.approx(shapely.bounds(town.outlines))
+        assert shapely.bounds(geometries(raw)) == pytest.approx(shapely.bounds(town.outlines))
         assert raw.crs.to_epsg() == 6668  # the horizontal part of EPSG:6697
         assert (
-            shapely.symmetric_difference(raw.geometries, town.outlines).tolist()
+            shapely.symmetric_difference(geometries(raw), town.outlines).tolist()
             == [shapely.Polygon()] * 4
         )
 
@@ -52,7 +49,7 @@ def test_attributes_and_values_that_mean_unknown(tmp_path):
     known = gml_building("bldg_1", 9.5, 3, _lod0())
     unknown = gml_building("bldg_2", -9999, 9999, _lod0(shapely.box(139.71, 35.5, 139.7101, 35.6)))
     raw = _read(tmp_path, gml_document(known + unknown))
-    table = imported(raw.attributes, "town.gml")
+    table = schema_columns(raw.attributes.to_pandas(), "town.gml")
     assert table["building_id"].tolist() == ["bldg_1", "bldg_2"]
     assert table["height"].tolist()[0] == 9.5
     assert table["storeys"].tolist()[0] == 3
@@ -67,8 +64,8 @@ def test_the_footprint_of_walls_comes_before_the_edge_of_the_roof(tmp_path):
     wide = shapely.box(139.7, 35.5, 139.7002, 35.5001)
     both = _lod0(wide) + _lod0(HOUSE, "lod0FootPrint")
     raw = _read(tmp_path, gml_document(gml_building("a", 9, 3, both)))
-    assert raw.geometries[0].equals(HOUSE)
-    assert raw.attributes["outline"].tolist() == ["lod0FootPrint"]
+    assert geometries(raw)[0].equals(HOUSE)
+    assert raw.attributes["outline"].to_pylist() == ["lod0FootPrint"]
 
 
 def test_a_block_with_a_lower_wing_is_seen_from_above(tmp_path):
@@ -78,7 +75,7 @@ def test_a_block_with_a_lower_wing_is_seen_from_above(tmp_path):
     surfaces += gml_walls(HOUSE, 3.0, 20.0) + gml_walls(wing, 3.0, 10.0)
     solid = f"<bldg:lod1Solid><gml:Solid>{surfaces}</gml:Solid></bldg:lod1Solid>"
     raw = _read(tmp_path, gml_document(gml_building("a", 9, 3, solid)))
-    assert raw.geometries[0].equals(shapely.union(HOUSE, wing))
+    assert geometries(raw)[0].equals(shapely.union(HOUSE, wing))
 
 
 def test_parts_give_outline_and_height_to_a_building_without(tmp_path):
@@ -89,9 +86,9 @@ def test_parts_give_outline_and_height_to_a_building_without(tmp_path):
     )
     member = f'<bldg:Building gml:id="whole">{part}</bldg:Building>'
     raw = _read(tmp_path, gml_document(member))
-    assert raw.attributes["id"].tolist() == ["whole"]
-    assert raw.attributes["measuredHeight"].tolist() == [7.0]
-    assert raw.geometries[0].equals(HOUSE)
+    assert raw.attributes["id"].to_pylist() == ["whole"]
+    assert raw.attributes["measuredHeight"].to_pylist() == [7.0]
+    assert geometries(raw)[0].equals(HOUSE)
 
 
 def test_projected_systems_and_the_older_order_of_short_names(tmp_path):
@@ -101,15 +98,15 @@ def test_projected_systems_and_the_older_order_of_short_names(tmp_path):
     text = gml_document(gml_building("a", 9, 3, _lod0(flipped)), "EPSG:25832")
     raw = _read(tmp_path, text)
     assert raw.crs.to_epsg() == 25832
-    assert raw.geometries[0].equals(metres)
+    assert geometries(raw)[0].equals(metres)
     urn = gml_document(gml_building("a", 9, 3, _lod0(flipped)), "urn:ogc:def:crs:EPSG::25832")
-    assert _read(tmp_path, urn).geometries[0].equals(metres)
+    assert geometries(_read(tmp_path, urn))[0].equals(metres)
 
 
 def test_feet_are_converted_and_unknown_units_fault_the_building(tmp_path):
     house = gml_building("a", 30, 3, _lod0())
     feet = _read(tmp_path, gml_document(house.replace('uom="m"', 'uom="ft"')))
-    assert feet.attributes["measuredHeight"].tolist() == [pytest.approx(9.144)]
+    assert feet.attributes["measuredHeight"].to_pylist() == [pytest.approx(9.144)]
     other = _read(tmp_path, gml_document(house.replace('uom="m"', 'uom="ell"')))
     assert "unit 'ell'" in other.faults[0]
 
@@ -128,7 +125,7 @@ def test_a_wrong_ring_faults_its_building_alone(tmp_path, old, new, fault):
     raw = _read(tmp_path, gml_document(wrong + good))
     assert fault in raw.faults.get(0, "")
     assert 1 not in raw.faults
-    assert raw.geometries[1] is not None
+    assert geometries(raw)[1] is not None
 
 
 BOMB = (
@@ -185,4 +182,4 @@ def test_what_is_refused_as_a_whole(tmp_path, text, problem):
 
 def test_a_building_without_outline_has_no_geometry(tmp_path):
     raw = _read(tmp_path, gml_document(gml_building("a", 9, 3, "")))
-    assert raw.geometries.tolist() == [None]
+    assert geometries(raw).tolist() == [None]

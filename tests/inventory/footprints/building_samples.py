@@ -49,6 +49,11 @@ def small_town() -> Town:
     return Town(outlines, ["b1", "b2", "b3", "b4"], [12.0, 9.0, 6.0, 9.0], [4, 3, 2, 3])
 
 
+def geometries(raw: Any) -> np.ndarray:
+    """Return the geometries of a layer as its reader has it."""
+    return shapely.from_wkb(raw.wkb.to_pylist())
+
+
 def _geojson(geometry: Any) -> Any:
     return json.loads(shapely.to_geojson(geometry))
 

@@ -1,0 +1,252 @@
+"""
+Published sources of buildings: their columns and codes, and rules for cells that need more.
+
+The table of aliases is ``sources.toml``; a layer is recognised by the names of its columns.
+"""
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.resources import files
+from typing import NamedTuple
+
+import pandas as pd
+
+from per_obspy.inventory.cells import plain_numbers, read_numbers
+from per_obspy.inventory.footprints.json_buildings import LENGTH_UNIT
+
+
+class Source(NamedTuple):
+    """
+    Names and codes of one source.
+
+    Attributes
+    ----------
+    name : str
+        The source.
+    needs : sequence of sequence of str
+        Sets of columns. A layer with all columns of one set is of this source.
+    columns : mapping of str to str
+        Name of a building's quantity in the schema -> the source's column, which may be absent.
+    carried : sequence of str
+        Columns to carry along unchanged.
+    class_column : str or None
+        Column of use or type, by which missing heights are estimated; empty if all buildings of a
+        layer are one class, None if heights are not estimated.
+    codes : sequence of str
+        Columns of material and lateral system; empty if the source has none.
+    systems : mapping of str to str
+        Code, material and lateral system joined by a blank -> structural system of the schema.
+    """
+
+    name: str
+    needs: list[list[str]]
+    columns: dict[str, str]
+    carried: tuple[str, ...] = ()
+    class_column: str | None = None
+    codes: tuple[str, ...] = ()
+    systems: Mapping[str, str] = {}
+
+
+@cache
+def sources() -> tuple[Source, ...]:
+    """Return all sources in the order in which a layer is recognised; the last fits every layer."""
+    table = tomllib.loads(files(__package__).joinpath("sources.toml").read_text("utf-8"))
+    read = []
+    for entry in table["source"]:
+        systems = entry.pop("systems", {})
+        by_code = {code: system for system, codes in systems.items() for code in codes}
+        read.append(Source(**entry, systems=by_code))
+    return tuple(read)
+
+
+def source_of(names: Iterable[str]) -> Source:
+    """
+    Return the source of a layer by the names of its columns.
+
+    Examples
+    --------
+    >>> source_of(["height", "confidence"]).name
+    'Microsoft building footprints'
+    """
+    known = set(names)
+    return next(
+        source for source in sources() if any(known.issuperset(each) for each in source.needs)
+    )
+
+
+def converted(attributes: pd.DataFrame, source: Source) -> pd.DataFrame:
+    """Return the attributes of a layer with the columns that the rule of its source adds."""
+    rule = _RULES.get(source.name)
+    return attributes if rule is None else rule(attributes.copy(), source)
+
+
+#: Tags of OpenStreetMap that are looked for in columns of several.
+_TAGS, _TAG_COLUMNS = ("height", "building:levels", "building"), ("other_tags", "tags")
+
+_HSTORE = re.compile(r'"(?P<key>(?:[^"\\]|\\.)*)"=>"(?P<value>(?:[^"\\]|\\.)*)"')
+
+
+def tags_of(cell: object) -> dict[str, object]:
+    """
+    Return the tags in a cell of several: JSON, or text of hstore as GDAL writes it.
+
+    Examples
+    --------
+    >>> tags_of('"height"=>"9 m","building:levels"=>"3"')
+    {'height': '9 m', 'building:levels': '3'}
+    >>> tags_of('{"height": "9"}'), tags_of(None), tags_of("{")
+    ({'height': '9'}, {}, {})
+    """
+    if not isinstance(cell, str):
+        return {}
+    if cell.lstrip().startswith("{"):
+        try:
+            tags = json.loads(cell)
+        except (ValueError, RecursionError):
+            return {}
+        return tags if isinstance(tags, dict) else {}
+    return {tag["key"]: tag["value"] for tag in _HSTORE.finditer(cell)}
+
+
+def _with_tags(table: pd.DataFrame, _: Source) -> pd.DataFrame:
+    """Return OpenStreetMap's columns with the known tags as columns, and one identifier."""
+    # Tags that are together in one column
+    for column in _TAG_COLUMNS:
+        if column in table:
+            cells = [tags_of(cell) for cell in table[column]]
+            for tag in _TAGS:
+                values = pd.Series([tags.get(tag) for tags in cells], table.index, dtype=object)
+                table[tag] = table[tag].astype(object).fillna(values) if tag in table else values
+    # Ways have one identifier in GDAL's layers, relations another
+    if "osm_way_id" in table:
+        way = "w" + table["osm_way_id"].astype(str)
+        given = table["osm_id"] if "osm_id" in table else pd.Series(None, table.index, dtype=object)
+        table["osm_id"] = given.fillna(way.mask(table["osm_way_id"].isna()))
+    for name in ("@id", "osmid", "feature_id"):
+        if name in table and "osm_id" not in table:
+            table["osm_id"] = table[name]
+    return table
+
+
+def _above_ground(table: pd.DataFrame, _: Source) -> pd.DataFrame:
+    """Return Overture's columns without the heights of buildings under the ground."""
+    if "is_underground" in table:
+        below = table["is_underground"].astype(str).str.lower() == "true"
+        # Text is no number: the pair is rejected with this word
+        for name in ("height", "num_floors"):
+            given = table[name] if name in table else pd.Series(None, table.index)
+            table[name] = given.astype(object).mask(below, "underground")
+    return table
+
+
+def _people_at_night(table: pd.DataFrame, _: Source) -> pd.DataFrame:
+    """Return columns of the National Structure Inventory with the people at night, of any age."""
+    if {"pop2amu65", "pop2amo65"} <= set(table):
+        table["pop2am"] = plain_numbers(table["pop2amu65"]) + plain_numbers(table["pop2amo65"])
+    return table
+
+
+#: Units of length in m.
+_METRES = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "ft": 0.3048, "in": 0.0254}
+
+
+def _in_metres(table: pd.DataFrame, _: Source) -> pd.DataFrame:
+    """Return SimCenter's columns with heights in m, each in the unit of its file, if known."""
+    name = next((name for name in ("Height", "height") if name in table), None)
+    if name is not None:
+        # Each building in the unit of its file
+        units = table.get(LENGTH_UNIT, pd.Series("", table.index)).astype(str)
+        heights = read_numbers("height", table[name]).values
+        table["height_m"] = heights * units.str.strip().str.lower().map(_METRES)
+    return table
+
+
+#: Longest string of a taxonomy that is taken apart, characters.
+_LONGEST = 500
+
+#: Storeys above ground: HEX:4 (exact), HAPP:4 (approximate), HBET:6,3 (range, upper bound first);
+#: in version 3 H:4 and HBET:3-6.
+_EXACT = re.compile(r"(?:H|HEX|HAPP):([0-9]{1,3})")
+_RANGE = re.compile(r"(?:H|HBET):([0-9]{1,3})[-,]([0-9]{1,3})")
+
+#: Logarithmic deviation of an approximate number of storeys: one of four, as in HAPP:4.
+_APPROXIMATE = 0.2
+
+#: Codes of the position in the block -> adjoining buildings.
+_ADJOINING = {"BPD": 0, "BP1": 1, "BP2": 2, "BP3": 3}
+
+
+def taxonomy(text: str, systems: Mapping[str, str]) -> tuple[float, float, str, int | None]:
+    """
+    Return the attributes of a string of the GEM Building Taxonomy.
+
+    Attributes are separated by ``/``, details of one by ``+``. Those of version 2 are in a fixed
+    order, those of version 3 are not, so that each is known by its code.
+
+    Parameters
+    ----------
+    text : str
+        The string; attributes that are not understood are unknown.
+    systems : mapping of str to str
+        Codes -> structural system.
+
+    Returns
+    -------
+    storeys : float
+        Above ground, NaN if unknown; the geometric mean of the ends of a range.
+    log_std : float
+        Logarithmic standard deviation of the storeys, NaN if they are exact or unknown; that of an
+        even distribution in a range.
+    code : str
+        Material, or material and lateral system, as ``systems`` has it; empty if unknown.
+    adjoining : int or None
+        Buildings that adjoin it.
+
+    Examples
+    --------
+    >>> taxonomy("CR+CIP/LFM+DUC/HEX:4/BP2", {"CR LFM": "concrete_mrf"})
+    (4.0, nan, 'CR LFM', 2)
+    """
+    parts = [part.strip() for part in text[:_LONGEST].upper().split("/")]
+    # The first detail of an attribute is its main code
+    codes = [part.split("+")[0] for part in parts]
+    lateral = next((code for code in codes if code.startswith("L")), "")
+    known = (key for code in codes for key in (code, f"{code} {lateral}") if key in systems)
+    adjoining = next((_ADJOINING[code] for code in codes if code in _ADJOINING), None)
+    return *_storeys("+".join(parts).split("+")), next(known, ""), adjoining
+
+
+def _storeys(details: list[str]) -> tuple[float, float]:
+    """Return storeys and their logarithmic deviation, NaN where unknown."""
+    for detail in details:
+        if exact := _EXACT.fullmatch(detail):
+            return float(exact[1]), _APPROXIMATE if detail.startswith("HAPP") else math.nan
+        if ends := _RANGE.fullmatch(detail):
+            low, high = sorted((float(ends[1]), float(ends[2])))
+            if low < 1.0:
+                break
+            # Even between the logarithms of the ends
+            return math.sqrt(low * high), math.log(high / low) / math.sqrt(12.0)
+    return math.nan, math.nan
+
+
+def _by_taxonomy(table: pd.DataFrame, source: Source) -> pd.DataFrame:
+    """Return GEM's columns with storeys, system and position in the block of each string."""
+    texts = table["taxonomy"].astype(str)
+    # A portfolio repeats few strings
+    known = {text: taxonomy(text, source.systems) for text in texts.unique()}
+    names = ["gem_storeys", "gem_log_std", "gem_code", "adjoining_buildings"]
+    return table.assign(**pd.DataFrame(texts.map(known).tolist(), table.index, names))
+
+
+_RULES = {
+    "OpenStreetMap": _with_tags,
+    "Overture Maps": _above_ground,
+    "National Structure Inventory": _people_at_night,
+    "SimCenter": _in_metres,
+    "GEM exposure": _by_taxonomy,
+}

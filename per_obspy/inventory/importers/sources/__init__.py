@@ -1,1 +1,0 @@
-"""One module per source of buildings: its columns, codes and units."""
