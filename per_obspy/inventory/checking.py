@@ -15,11 +15,10 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.inventory.cells import NOTES, read_columns, read_texts
 from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
-from per_obspy.inventory.table_columns import numbers_in
+from per_obspy.inventory.table_columns import metres_between, numbers_in
 
 #: Height of one storey, m: a hall may have 12 m, but 28 m is a mistake in height or storeys.
 STOREY_HEIGHTS = (2.0, 12.0)
@@ -297,7 +296,7 @@ def _separations(pairs: pd.DataFrame) -> Iterator[Fault]:
     names = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
     # Far from each other, whatever the reason
     corners = [numbers_in(pairs, name) for name in names]
-    distance = _distance(*corners)
+    distance = np.hypot(*metres_between(*corners))
     # Positions outside the range of the schema are a separate fault
     in_range = [np.abs(numbers_in(pairs, name)) <= COLUMNS[name].high for name in names]
     is_far = np.all(in_range, axis=0) & (distance > LARGEST_SEPARATION)
@@ -321,18 +320,9 @@ def _usual_mistake(
     }
     # Positions of the second building as they may be meant
     for way, meant in other_ways.items():
-        if _distance(longitude_1, latitude_1, *meant) <= LARGEST_SEPARATION:
+        if np.hypot(*metres_between(longitude_1, latitude_1, *meant)) <= LARGEST_SEPARATION:
             return f": {way}?"
     return ""
-
-
-def _distance(
-    longitude_1: ArrayLike, latitude_1: ArrayLike, longitude_2: ArrayLike, latitude_2: ArrayLike
-) -> FloatArray:
-    """Return the distance, m, on a sphere taken as flat, across the date line too."""
-    north = np.subtract(latitude_2, latitude_1)
-    east = (np.subtract(longitude_2, longitude_1) + 180.0) % 360.0 - 180.0
-    return np.asarray(METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1))))
 
 
 def _same_building(pairs: pd.DataFrame) -> Iterator[Fault]:
