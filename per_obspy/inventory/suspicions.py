@@ -612,6 +612,7 @@ class _FileAccount:
 
     def _add_limits(self, rows: PairRows | BuildingRows) -> None:
         """Add the numbers above limits, and those above 0."""
+        # A column may have several limits
         for limit in LIMITS:
             if rows.has(limit.column):
                 numbers = np.abs(getattr(rows, limit.column))
