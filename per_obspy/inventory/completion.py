@@ -151,7 +151,7 @@ class _Completion:
         known, formula = ~np.isnan(height), _FORMULAS[building.period_formula]
         period = np.where(known, formula(np.where(known, height, 1.0), system), np.nan)
         # Damping as a fraction of critical
-        assumed = {
+        assumed: dict[str, tuple[FloatArray | float, FloatArray | float]] = {
             "period": (period, period_log_std(system, height_log_std)),
             "damping": (building.damping, building.damping_log_std),
         }

@@ -1,5 +1,5 @@
 """
-Quantities of raw rows of a pair table and of their buildings, by name, in SI and degrees.
+Quantities of rows of a pair table and of their buildings, by name, in SI and degrees.
 
 A value is NaN where it is missing or impossible; NaN compares as false, which is meant throughout:
 a missing value is not odd.
@@ -8,13 +8,19 @@ a missing value is not odd.
 from functools import cached_property
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.checking import LARGEST_SEPARATION
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.table_columns import metres_between
+
+#: Largest distance between the two positions of a pair, m; neighbours' centres lie closer.
+LARGEST_SEPARATION = 1000.0
+
+#: Height of one storey, m: a hall may have 12 m, but 28 m is a mistake in height or storeys.
+STOREY_HEIGHTS = (2.0, 12.0)
 
 #: Positions closer than this give no reliable direction, m.
 LINE = 2.0
@@ -31,23 +37,22 @@ class _Rows:
 
     suffix = ""
 
-    def __init__(self, table: pa.Table) -> None:
+    def __init__(self, table: pa.Table | pd.DataFrame) -> None:
         self.table = table
-        self._names = frozenset(table.column_names)
+        self._names = frozenset(getattr(table, "column_names", getattr(table, "columns", ())))
 
     def has(self, name: str) -> bool:
         """Return whether the table has a column, whose name lacks the building's number."""
         return f"{name}{self.suffix}" in self._names
 
     def __getattr__(self, name: str) -> FloatArray:
-        column = f"{name}{self.suffix}"
-        if column not in COLUMNS:
+        column = COLUMNS.get(f"{name}{self.suffix}")
+        if column is None or column.dtype == "str":
             raise AttributeError(name)
+        # Kept, as most are asked for several times
         numbers = np.full(len(self.table), np.nan)
-        # Truth values, dates and texts are no numbers
-        kind = self.table.schema.field(column).type if self.has(name) else pa.null()
-        if pa.types.is_floating(kind) or pa.types.is_integer(kind):
-            numbers = np.asarray(self.table[column].to_numpy(), dtype=np.float64)
+        if self.has(name):
+            numbers = np.asarray(self.table[column.name].to_numpy(), dtype=np.float64)
         setattr(self, name, numbers)
         return numbers
 
@@ -67,13 +72,17 @@ class PairRows(_Rows):
         return metres_between(first.longitude, first.latitude, second.longitude, second.latitude)
 
     @cached_property
-    def distance(self) -> FloatArray:
-        """The distance of the positions; NaN where the row is refused for them."""
-        distance = np.hypot(*self.way)
-        is_valid = distance <= LARGEST_SEPARATION
+    def separation(self) -> FloatArray:
+        """The distance of the positions; NaN unless both are on the Earth."""
+        is_valid = np.ones(len(self.table), dtype=bool)
         for one in self.buildings:
             is_valid &= (np.abs(one.longitude) <= 180.0) & (np.abs(one.latitude) <= 90.0)
-        return np.where(is_valid, distance, np.nan)
+        return np.where(is_valid, np.hypot(*self.way), np.nan)
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """The separation; NaN where the row is refused for it."""
+        return np.where(self.separation <= LARGEST_SEPARATION, self.separation, np.nan)
 
     @cached_property
     def direction(self) -> FloatArray:
@@ -108,10 +117,16 @@ class PairRows(_Rows):
         return self.gap[self.gap > 0.0]
 
     @cached_property
-    def half_storey(self) -> FloatArray:
-        """Half of the higher storey, and a little more: no nearest floor is further away."""
-        storey = np.fmax(*(one.height / one.storeys for one in self.buildings))
-        return np.where(np.isnan(storey), STOREY, storey / 2.0 + 0.1)
+    def lower_roof(self) -> FloatArray:
+        """The height of the lower building; without height the highest that storeys may make."""
+        first, second = self.buildings
+        return np.fmin(first.highest, second.highest)
+
+    @cached_property
+    def storey(self) -> FloatArray:
+        """The height of the higher storeys."""
+        first, second = self.buildings
+        return np.fmax(first.storey, second.storey)
 
 
 class BuildingRows(_Rows):
@@ -125,6 +140,16 @@ class BuildingRows(_Rows):
     def size(self) -> FloatArray:
         """The height, from storeys where it is not given."""
         return np.where(np.isnan(self.height), STOREY * self.storeys, self.height)
+
+    @cached_property
+    def storey(self) -> FloatArray:
+        """The height of a storey."""
+        return self.height / self.storeys
+
+    @cached_property
+    def highest(self) -> FloatArray:
+        """The height; where it is not given the highest that the storeys may make."""
+        return np.where(np.isnan(self.height), STOREY_HEIGHTS[1] * self.storeys, self.height)
 
     @cached_property
     def period_ratio(self) -> FloatArray:

@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.earlier_rows import EarlierRows, Identities, identities
-from per_obspy.inventory.quantities import FRAME_EXPONENT, LINE, TOWER, BuildingRows, PairRows
+from per_obspy.inventory.quantities import (
+    FRAME_EXPONENT,
+    LINE,
+    STOREY,
+    TOWER,
+    BuildingRows,
+    PairRows,
+)
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.table_columns import joined_names
 
@@ -241,7 +248,9 @@ ROW_RULES = (
             "contact_height storeys_1 storeys_2", _is_above_roof),
     RowRule(
         "odd_height", "floor_offset", "floor_offset above half a storey", "floor_offset",
-        lambda pair: np.abs(pair.floor_offset) > pair.half_storey,
+        # The nearest floor is at most half a storey away
+        lambda pair: np.abs(pair.floor_offset)
+        > np.where(np.isnan(pair.storey), STOREY, pair.storey / 2.0 + 0.1),
     ),
 )  # fmt: skip
 
