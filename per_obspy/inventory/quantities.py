@@ -103,7 +103,7 @@ class PairRows(_Rows):
     @cached_property
     def apart(self) -> FloatArray:
         """The distance of the positions beyond the gap."""
-        return self.distance - np.nan_to_num(np.clip(self.gap, 0.0, 10.0))
+        return self.distance - np.minimum(np.fmax(self.gap, 0.0), 10.0)
 
     @cached_property
     def roots(self) -> FloatArray:

@@ -645,7 +645,9 @@ class _FileAccount:
         # The last cells have both of their edges
         cell = (np.minimum(east, 359.0) * 180.0 + np.minimum(north, 179.0)).astype(np.int64)
         self._cells += np.bincount(cell, minlength=360 * 180)
-        np.minimum.at(self._cell_line, cell, lines[valid])
+        # Lines come in their order: a cell keeps its first one
+        is_new = self._cell_line[cell] == _INT_MAX
+        np.minimum.at(self._cell_line, cell[is_new], lines[valid][is_new])
 
     def _findings(self) -> list[_Finding]:
         """Return the suspicions of columns, in the order of their sentences."""
