@@ -9,7 +9,7 @@ is in tables: ``GAP_RULES``, ``LIMITS`` and ``COLUMN_RULES`` for columns, ``ROW_
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -677,8 +677,8 @@ class _FileAccount:
     def units(self) -> dict[str, str]:
         """Return the units that the columns may have; those by limits are more certain."""
         units = dict[str, str]()
-        for finding in self._findings():
-            units = dict(finding.units) | units
+        for name, unit in chain.from_iterable(finding.units for finding in self._findings()):
+            units.setdefault(name, unit)
         return units
 
     def sentences(self) -> list[str]:
