@@ -6,8 +6,8 @@ Each check works on whole columns. A row with a fault becomes a
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Self
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Self
 from unicodedata import category
 
 import numpy as np
@@ -15,17 +15,16 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.inventory.cells import NOTES, read_columns, read_texts
+from per_obspy.inventory.quantities import (
+    LARGEST_SEPARATION,
+    STOREY_HEIGHTS,
+    BuildingRows,
+    PairRows,
+)
 from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
-from per_obspy.inventory.table_columns import numbers_in
-
-#: Height of one storey, m: a hall may have 12 m, but 28 m is a mistake in height or storeys.
-STOREY_HEIGHTS = (2.0, 12.0)
-
-#: Largest distance between the two positions of a pair, m; neighbours' centres lie closer.
-LARGEST_SEPARATION = 1000.0
+from per_obspy.inventory.table_columns import metres_between
 
 #: A contact height may exceed the lower building by this much, m: heights are often rounded,
 #: contact heights computed.
@@ -93,8 +92,8 @@ def checked_pairs(
     pairs, faults = _converted(table.assign(pair_id=row_names(table, lines)))
     identifiers = pairs["pair_id"]
     faults += _duplicates(identifiers, identifiers.duplicated() if repeated is None else repeated)
-    for check in _CHECKS:
-        faults += check(pairs)
+    with np.errstate(all="ignore"):
+        faults += _impossible(PairRows(pairs))
     # Separate the rows without a fault from the rejected ones
     rejected = _rejections(identifiers, faults, source, lines)
     is_faulty = np.zeros(len(pairs), dtype=bool)
@@ -229,141 +228,127 @@ def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
         yield i, f"pair_id = {identifiers.iloc[i]!r} occurs in an earlier row already"
 
 
-def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows in which a building has neither height nor storeys nor period."""
-    for group in ONE_OF:
-        known = [~np.isnan(numbers_in(pairs, name)) for name in group]
-        for i in _rows(~np.any(known, axis=0)):
-            reason = f"none of {', '.join(group)} is a number, one is needed"
-            notes = _noted(pairs, i, group)
-            yield i, f"{reason}: {notes}" if notes else reason
+class _Check(NamedTuple):
+    """
+    Rows that are impossible, and why.
+
+    A reason is text with numbers of the row in braces and # for the building, or makes the text.
+    """
+
+    is_wrong: Callable[[Any], NDArray[np.bool_]]
+    reason: str | Callable[[Any, int], str]
+    of_buildings: bool = False
 
 
-def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows in which height over number of storeys is no height of a storey."""
-    low, high = STOREY_HEIGHTS
-    for index in (1, 2):
-        height = numbers_in(pairs, f"height_{index}")
-        storeys = numbers_in(pairs, f"storeys_{index}")
-        # Mean height of a storey where both are known
-        with np.errstate(divide="ignore", invalid="ignore"):
-            storey = height / storeys
-        is_outside = (storey < low) | (storey > high)
-        for i in _rows((height > 0) & (storeys > 0) & is_outside):
-            yield (
-                i,
-                f"height_{index} = {height[i]:g} m with storeys_{index} = {storeys[i]:g} "
-                f"makes floors of {storey[i]:.3g} m, outside {low:g} to {high:g} m",
-            )
+class _Numbers(dict[str, float]):
+    """Numbers of a row by name."""
+
+    def __init__(self, rows: PairRows | BuildingRows, row: int) -> None:
+        super().__init__()
+        self._rows, self._row = rows, row
+
+    def __missing__(self, name: str) -> float:
+        return float(getattr(self._rows, name)[self._row])
 
 
-def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows whose contact height is above the lower building."""
-    contact = numbers_in(pairs, "contact_height")
-    # Of a building without height the highest that its storeys may make
-    roofs = []
-    for i in (1, 2):
-        height = numbers_in(pairs, f"height_{i}")
-        highest = STOREY_HEIGHTS[1] * numbers_in(pairs, f"storeys_{i}")
-        roofs.append(np.where(np.isnan(height), highest, height))
-    lower = np.fmin(*roofs)
-    for i in _rows(contact > lower + CONTACT_TOLERANCE):
-        yield i, f"contact_height = {contact[i]:g} m is above the lower building, {lower[i]:g} m"
+def _impossible(pair: PairRows) -> Iterator[Fault]:
+    """Yield rows with values that contradict each other or the world."""
+    for check in _CHECKS:
+        for rows in pair.buildings if check.of_buildings else (pair,):
+            for i in _rows(check.is_wrong(rows)):
+                if isinstance(check.reason, str):
+                    reason = check.reason.replace("_#", rows.suffix)
+                    yield i, reason.format_map(_Numbers(rows, i))
+                else:
+                    yield i, check.reason(rows, i)
 
 
-def _floor_offsets(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows whose nearest floor would be further away than a storey."""
-    offset = np.abs(numbers_in(pairs, "floor_offset"))
-    # Of the building with the higher storeys
-    with np.errstate(divide="ignore", invalid="ignore"):
-        storey = np.fmax(
-            *(numbers_in(pairs, f"height_{i}") / numbers_in(pairs, f"storeys_{i}") for i in (1, 2))
-        )
-    for i in _rows(offset > storey):
-        yield i, f"floor_offset = {offset[i]:g} m is larger than a storey, {storey[i]:.3g} m"
+def _without_size(one: BuildingRows, i: int) -> str:
+    """Return that a row has a building without size, with the notes on its cells."""
+    group = [f"{name}{one.suffix}" for name in ("height", "storeys", "period")]
+    notes = _noted(one.table, i, group)
+    reason = f"none of {', '.join(group)} is a number, one is needed"
+    return f"{reason}: {notes}" if notes else reason
 
 
-def _placeholders(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows with a building at 0, 0, which many programs write for a missing position."""
-    for index in (1, 2):
-        longitude = numbers_in(pairs, f"longitude_{index}")
-        latitude = numbers_in(pairs, f"latitude_{index}")
-        for i in _rows((longitude == 0.0) & (latitude == 0.0)):
-            yield i, f"longitude_{index} = latitude_{index} = 0 is a placeholder, not a position"
-
-
-def _separations(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows whose buildings lie too far from each other for neighbours."""
-    names = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
-    # Far from each other, whatever the reason
-    corners = [numbers_in(pairs, name) for name in names]
-    distance = _distance(*corners)
-    # Positions outside the range of the schema are a separate fault
-    in_range = [np.abs(numbers_in(pairs, name)) <= COLUMNS[name].high for name in names]
-    is_far = np.all(in_range, axis=0) & (distance > LARGEST_SEPARATION)
-    for i in _rows(is_far):
-        longitude_1, latitude_1, longitude_2, latitude_2 = (float(values[i]) for values in corners)
-        first = f"(longitude_1 = {longitude_1:g}, latitude_1 = {latitude_1:g})"
-        second = f"(longitude_2 = {longitude_2:g}, latitude_2 = {latitude_2:g})"
-        apart = f"the positions {first} and {second} are {distance[i] / 1000:.3g} km apart"
-        yield i, apart + _usual_mistake(longitude_1, latitude_1, longitude_2, latitude_2)
-
-
-def _usual_mistake(
-    longitude_1: float, latitude_1: float, longitude_2: float, latitude_2: float
-) -> str:
-    """Return the mistake without which two positions would be neighbours, empty if none is."""
-    other_ways = {
-        "a longitude without its sign": (-longitude_2, latitude_2),
-        "a latitude without its sign": (longitude_2, -latitude_2),
-        "both without their sign": (-longitude_2, -latitude_2),
-        "longitude and latitude exchanged in one of them": (latitude_2, longitude_2),
-    }
+def _too_far(pair: PairRows, i: int) -> str:
+    """Return why positions lie too far from each other, with the usual mistake that explains it."""
+    first, second = ((float(one.longitude[i]), float(one.latitude[i])) for one in pair.buildings)
+    places = [
+        f"(longitude_{k} = {place[0]:g}, latitude_{k} = {place[1]:g})"
+        for k, place in enumerate((first, second), 1)
+    ]
+    apart = f"{pair.separation[i] / 1000:.3g} km apart"
     # Positions of the second building as they may be meant
-    for way, meant in other_ways.items():
-        if _distance(longitude_1, latitude_1, *meant) <= LARGEST_SEPARATION:
-            return f": {way}?"
-    return ""
+    east, north = second
+    other_ways = {
+        "a longitude without its sign": (-east, north),
+        "a latitude without its sign": (east, -north),
+        "both without their sign": (-east, -north),
+        "longitude and latitude exchanged in one of them": (north, east),
+    }
+    # The first way in which they would be neighbours
+    near = (
+        f": {way}?"
+        for way, meant in other_ways.items()
+        if np.hypot(*metres_between(*first, *meant)) <= LARGEST_SEPARATION
+    )
+    return f"the positions {' and '.join(places)} are {apart}{next(near, '')}"
 
 
-def _distance(
-    longitude_1: ArrayLike, latitude_1: ArrayLike, longitude_2: ArrayLike, latitude_2: ArrayLike
-) -> FloatArray:
-    """Return the distance, m, on a sphere taken as flat, across the date line too."""
-    north = np.subtract(latitude_2, latitude_1)
-    east = (np.subtract(longitude_2, longitude_1) + 180.0) % 360.0 - 180.0
-    return np.asarray(METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1))))
-
-
-def _same_building(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows that name the same building twice."""
-    if {"building_id_1", "building_id_2"} <= set(pairs.columns):
-        first, second = pairs["building_id_1"], pairs["building_id_2"]
-        for i in _rows((first == second) & (first != "")):
-            yield (
-                i,
-                f"building_id_1 = building_id_2 = {first.iloc[i]!r}: "
-                "a building has no gap to itself",
-            )
-
-
-def _observations(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows whose observation is between 0 and 1."""
-    observed = numbers_in(pairs, "observed")
-    for i in _rows((observed > 0.0) & (observed < 1.0)):
-        yield i, f"observed = {observed[i]:g} is neither 0 nor 1"
+def _is_same_building(pair: PairRows) -> NDArray[np.bool_]:
+    """Return rows that name the same building twice."""
+    if not (pair.has("building_id_1") and pair.has("building_id_2")):
+        return np.zeros(len(pair.table), dtype=bool)
+    first = pair.table["building_id_1"]
+    return ((first == pair.table["building_id_2"]) & (first != "")).to_numpy(dtype=bool)
 
 
 _CHECKS = (
-    _sizes,
-    _storey_heights,
-    _contact_heights,
-    _floor_offsets,
-    _placeholders,
-    _separations,
-    _same_building,
-    _observations,
-)
+    _Check(
+        lambda one: np.isnan(one.height) & np.isnan(one.storeys) & np.isnan(one.period),
+        _without_size,
+        of_buildings=True,
+    ),
+    _Check(
+        lambda one: (
+            (one.height > 0.0) & (one.storeys > 0.0)
+            & ((one.storey < STOREY_HEIGHTS[0]) | (one.storey > STOREY_HEIGHTS[1]))
+        ),
+        "height_# = {height:g} m with storeys_# = {storeys:g} makes floors of {storey:.3g} m, "
+        f"outside {STOREY_HEIGHTS[0]:g} to {STOREY_HEIGHTS[1]:g} m",
+        of_buildings=True,
+    ),
+    _Check(
+        lambda pair: pair.contact_height > pair.lower_roof + CONTACT_TOLERANCE,
+        "contact_height = {contact_height:g} m is above the lower building, {lower_roof:g} m",
+    ),
+    _Check(
+        lambda pair: np.abs(pair.floor_offset) > pair.storey,
+        lambda pair, i: (
+            f"floor_offset = {abs(pair.floor_offset[i]):g} m is larger than a storey, "
+            f"{pair.storey[i]:.3g} m"
+        ),
+    ),
+    # Many programs write 0 for a missing position
+    _Check(
+        lambda one: (one.longitude == 0.0) & (one.latitude == 0.0),
+        "longitude_# = latitude_# = 0 is a placeholder, not a position",
+        of_buildings=True,
+    ),
+    _Check(lambda pair: pair.separation > LARGEST_SEPARATION, _too_far),
+    _Check(
+        _is_same_building,
+        lambda pair, i: (
+            f"building_id_1 = building_id_2 = {pair.table['building_id_1'].iloc[i]!r}: "
+            "a building has no gap to itself"
+        ),
+    ),
+    _Check(
+        lambda pair: (pair.observed > 0.0) & (pair.observed < 1.0),
+        "observed = {observed:g} is neither 0 nor 1",
+    ),
+)  # fmt: skip
 
 
 def _rejections(

@@ -5,8 +5,8 @@ Names and positions are remembered as hashes of 64 bits: of 1e7 pairs two differ
 by chance with a probability of 3e-6.
 """
 
-from collections.abc import Iterator
-from typing import NamedTuple, Protocol
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 import pyarrow as pa
@@ -14,19 +14,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.inventory.quantities import BuildingRows, PairRows
 from per_obspy.inventory.schema import EMPTY, SYSTEMS
 
 _Hashes = NDArray[np.uint64]
-
-
-class Numbers(Protocol):
-    """Columns of numbers of some rows, NaN where a cell is none or the table has no such column."""
-
-    def has(self, *names: str) -> bool:
-        """Return whether the table has all these columns."""
-
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return a column."""
 
 
 class _Quantity(NamedTuple):
@@ -69,283 +60,287 @@ _QUANTITIES = (
 )
 
 
+class Identities(NamedTuple):
+    """
+    What tells pairs and buildings of some rows from others.
+
+    Attributes
+    ----------
+    pairs : (n_pairs,) ndarray of uint64
+        Hash of each pair that can be told from others, the same whichever building is the first.
+    pair_rows : (n_pairs,) ndarray of int
+        Row of each in the table.
+    names : (n_buildings,) ndarray of uint64
+        Hash of the identifier of each building that has one.
+    signatures : (n_buildings,) ndarray of uint64
+        Quantities of each.
+    places : (n_buildings,) ndarray of int
+        Twice the row of each in the table, and 1 more for building 2.
+    """
+
+    pairs: _Hashes
+    pair_rows: NDArray[np.intp]
+    names: _Hashes
+    signatures: _Hashes
+    places: NDArray[np.intp]
+
+    @classmethod
+    def joined(cls, blocks: Sequence[Self]) -> Self:
+        """Return the identities of several blocks of rows."""
+        return cls(*map(np.concatenate, zip(*blocks, strict=True)))
+
+
+def identities(pair: PairRows, comparable: NDArray[np.bool_], start: int) -> Identities:
+    """
+    Return what tells pairs and buildings from others: both ``building_id``, else the bodies.
+
+    Parameters
+    ----------
+    pair : PairRows
+        Raw rows.
+    comparable : (n_rows,) ndarray of bool
+        Rows that are compared.
+    start : int
+        Row of the first one in the whole table.
+    """
+    names = [_name_hashes(one) for one in pair.buildings]
+    pairs, is_clear = _pair_hashes(pair, names)
+    rows = np.flatnonzero(is_clear & comparable)
+    # Buildings 1 and 2 of each row one after the other
+    keys = np.stack(names, axis=1).ravel()
+    named = np.flatnonzero(keys * np.repeat(comparable, 2))
+    signatures = np.empty(0, dtype=np.uint64)
+    if named.size:
+        signatures = np.stack([_signature(one) for one in pair.buildings], axis=1).ravel()[named]
+    return Identities(pairs[rows], rows + start, keys[named], signatures, named + 2 * start)
+
+
+def _pair_hashes(pair: PairRows, names: list[_Hashes]) -> tuple[_Hashes, NDArray[np.bool_]]:
+    """Return a hash of each pair, and which pairs can be told from others."""
+    # Either both buildings have names or neither counts
+    is_named = (names[0] != 0) & (names[1] != 0)
+    if is_named.all():
+        return names[0] + names[1], is_named
+    places = [_place_hashes(one) for one in pair.buildings]
+    bodies = map(_body_hashes, pair.buildings, places)
+    first, second = (np.where(is_named, *both) for both in zip(names, bodies, strict=True))
+    # Pairs at one position without names are like others there
+    return first + second, is_named | (places[0] != places[1])
+
+
 class EarlierRows:
     """Buildings and pairs of the rows so far."""
 
     def __init__(self) -> None:
-        self._pairs, self._buildings = _HashTable(), _HashTable()
+        self._pairs, self._buildings = FirstValues(), FirstValues()
 
-    def compare(
-        self,
-        table: pa.Table,
-        numbers: Numbers,
-        comparable: NDArray[np.bool_],
-        lines: NDArray[np.int64],
-    ) -> tuple[NDArray[np.bool_], NDArray[np.int64], dict[str, NDArray[np.bool_]]]:
+    def repeated_pairs(
+        self, found: Identities, lines: NDArray[np.int64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
         """
-        Compare rows with the earlier ones, and remember them.
+        Return the rows with a pair of an earlier row, and the lines of those; remember the others.
 
         Parameters
         ----------
-        table : Table
-            Raw rows.
-        numbers : Numbers
-            Their columns of numbers.
-        comparable : (n_rows,) ndarray of bool
-            Rows to compare; the others are neither compared nor remembered.
+        found : Identities
+            Of the rows.
         lines : (n_rows,) ndarray of int
-            Of the rows in their file.
-
-        Returns
-        -------
-        is_repeated : (n_rows,) ndarray of bool
-            Pairs of earlier rows: by both ``building_id``, else by both positions, heights, storeys
-            and periods.
-        earlier_line : (n_rows,) ndarray of int
-            Lines of those earlier rows, 0 for other rows.
-        contradictions : dict of str to (n_rows, 2) ndarray of bool
-            By what differs (``height`` and the like), buildings of a ``building_id`` that an
-            earlier row describes otherwise.
+            Of all rows in their file.
         """
-        rows = np.flatnonzero(comparable)
-        names = [_name_hashes(table, i, rows) for i in (1, 2)]
-        keys, is_clear = _pair_hashes(numbers, rows, names)
-        again, first = self._pairs.first_values(keys, lines[rows[is_clear]].astype(np.uint64))
-        # Back to the places in the table
-        is_repeated, earlier_line = np.zeros(len(table), bool), np.zeros(len(table), np.int64)
-        repeated = rows[is_clear][again]
-        is_repeated[repeated], earlier_line[repeated] = True, first[again].astype(np.int64)
-        return is_repeated, earlier_line, self._contradictions(table, numbers, rows, names)
+        keys, line = found.pairs, lines[found.pair_rows].astype(np.uint64)
+        groups = _Groups(keys)
+        is_stored, earlier = self._pairs.look_up(groups.keys)
+        # Earlier lines come before those of this block
+        first = np.where(is_stored, earlier, line[groups.first])
+        self._pairs.add(groups.keys[~is_stored], first[~is_stored])
+        is_later = groups.first[groups.group] != np.arange(keys.size)
+        again = np.flatnonzero(is_stored[groups.group] | is_later)
+        return found.pair_rows[again], first[groups.group[again]].astype(np.int64)
 
-    def _contradictions(
-        self, table: pa.Table, numbers: Numbers, rows: NDArray[np.intp], names: list[_Hashes]
-    ) -> dict[str, NDArray[np.bool_]]:
-        """Return buildings that an earlier row describes otherwise, by what differs."""
-        keys = np.stack(names, axis=1).ravel()
-        named = keys != 0
-        differs: dict[str, NDArray[np.bool_]] = {}
-        if not named.any():
-            return differs
-        # Buildings 1 and 2 of each row one after the other
-        signatures = np.stack([_signature(table, numbers, i, rows) for i in (1, 2)], axis=1).ravel()
-        for quantity, is_other in self._buildings.compare(keys[named], signatures[named]):
-            other = np.zeros(keys.size, dtype=bool)
-            other[named] = is_other
-            odd = differs.setdefault(quantity.name, np.zeros((len(table), 2), dtype=bool))
-            odd[rows] |= other.reshape(-1, 2)
-        return differs
-
-
-class _Stored(NamedTuple):
-    """Whether keys are stored, with which values, in which run and where in it."""
-
-    is_stored: NDArray[np.bool_]
-    values: _Hashes
-    run: NDArray[np.int64]
-    place: NDArray[np.intp]
+    def contradictions(self, found: Identities) -> dict[str, NDArray[np.intp]]:
+        """Return the places of buildings that an earlier row describes otherwise, by quantity."""
+        # The first signature of each building
+        groups = _Groups(found.names)
+        is_stored, earlier = self._buildings.look_up(groups.keys)
+        first = np.where(is_stored, earlier, found.signatures[groups.first])
+        # Most tables describe a building always in the same way
+        is_other = found.signatures != first[groups.group]
+        differs = np.zeros(groups.keys.size, dtype=bool)
+        differs[groups.group[is_other]] = True
+        rows = np.flatnonzero(differs[groups.group])
+        group = (np.cumsum(differs) - 1)[groups.group[rows]]
+        first[differs], odd = _compare(found.signatures[rows], first[differs], group)
+        # What the first rows do not give stays for later ones to be compared with
+        self._buildings.replace(groups.keys[differs], first[differs])
+        self._buildings.add(groups.keys[~is_stored], first[~is_stored])
+        return {name: found.places[rows[other]] for name, other in odd.items()}
 
 
-class _HashTable:
+def _compare(
+    signatures: _Hashes, first: _Hashes, group: NDArray[np.intp]
+) -> tuple[_Hashes, dict[str, NDArray[np.bool_]]]:
+    """Return first signatures of groups, filled up by later ones, and what differs from them."""
+    odd = dict[str, NDArray[np.bool_]]()
+    for quantity in _QUANTITIES if group.size else ():
+        value, one = quantity.of(signatures), quantity.of(first)
+        # Missing (0) first values; backwards, so that the first one of a group stays
+        given = np.flatnonzero((value > 0) & (one[group] == 0))[::-1]
+        one[group[given]] = value[given]
+        first = first | (one.astype(np.uint64) << np.uint64(quantity.first_bit))
+        other = quantity.differs(value, one[group])
+        if other.any():
+            odd[quantity.name] = odd.get(quantity.name, False) | other
+    return first, odd
+
+
+class FirstValues:
     """Values by hashes, in sorted runs that grow by merging, as a sorted array has no gaps."""
 
     def __init__(self) -> None:
-        self._keys: list[_Hashes] = []
-        self._values: list[_Hashes] = []
+        self._runs: list[tuple[_Hashes, _Hashes]] = []
 
-    def first_values(self, keys: _Hashes, values: _Hashes) -> tuple[NDArray[np.bool_], _Hashes]:
-        """
-        Return which keys occurred before, and the value of each key's first occurrence.
+    def look_up(self, keys: _Hashes) -> tuple[NDArray[np.bool_], _Hashes]:
+        """Return which sorted keys are stored, and their values."""
+        is_stored, values = np.zeros(keys.size, dtype=bool), np.zeros(keys.size, dtype=np.uint64)
+        for stored, at, here in self._places(keys):
+            is_stored[here], values[here] = True, stored[at]
+        return is_stored, values
 
-        New keys are added with their values.
-        """
-        distinct, first, group = _groups(keys)
-        found = self._look_up(distinct)
-        # Earlier values come before those of this block
-        start = values[first]
-        start[found.is_stored] = found.values[found.is_stored]
-        self._add(distinct[~found.is_stored], start[~found.is_stored])
-        again = found.is_stored[group] | (first[group] != np.arange(keys.size))
-        return again, start[group]
+    def replace(self, keys: _Hashes, values: _Hashes) -> None:
+        """Replace the values of those sorted keys that are stored."""
+        for stored, at, here in self._places(keys):
+            stored[at] = values[here]
 
-    def compare(
-        self, keys: _Hashes, signatures: _Hashes
-    ) -> Iterator[tuple[_Quantity, NDArray[np.bool_]]]:
-        """Yield where a quantity differs from the first value of its key, and remember those."""
-        distinct, first, group = _groups(keys)
-        found = self._look_up(distinct)
-        # New keys that occur once have nothing to be compared with
-        merged = np.where(found.is_stored, found.values, 0)
-        if distinct.size == keys.size and not found.is_stored.any():
-            merged = signatures[first]
-        else:
-            for quantity in _QUANTITIES:
-                value, first_value = quantity.of(signatures), quantity.of(merged)
-                _fill(first_value, value, group)
-                merged |= first_value.astype(np.uint64) << np.uint64(quantity.first_bit)
-                yield quantity, quantity.differs(value, first_value[group])
-        # What the first rows do not give stays for later ones to compare with
-        for run, values in enumerate(self._values):
-            values[found.place[found.run == run]] = merged[found.run == run]
-        self._add(distinct[~found.is_stored], merged[~found.is_stored])
+    def _places(
+        self, keys: _Hashes
+    ) -> Iterator[tuple[_Hashes, NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield the values of each run, the places of keys in it, and which keys those are."""
+        for run, values in self._runs if keys.size else ():
+            at = np.minimum(np.searchsorted(run, keys), run.size - 1)
+            here = np.flatnonzero(run[at] == keys)
+            yield values, at[here], here
 
-    def _look_up(self, keys: _Hashes) -> _Stored:
-        """Return where sorted keys are stored, and their values."""
-        run, place = np.full(keys.size, -1), np.zeros(keys.size, dtype=np.intp)
-        values = np.zeros(keys.size, dtype=np.uint64)
-        # Each key is in one run at most
-        for number, stored in enumerate(self._keys):
-            at = np.minimum(np.searchsorted(stored, keys), stored.size - 1)
-            here = np.flatnonzero(stored[at] == keys)
-            run[here], place[here] = number, at[here]
-            values[here] = self._values[number][at[here]]
-        return _Stored(run >= 0, values, run, place)
-
-    def _add(self, keys: _Hashes, values: _Hashes) -> None:
+    def add(self, keys: _Hashes, values: _Hashes) -> None:
         """Add sorted keys that are not stored; runs of similar size become one."""
-        while self._keys and self._keys[-1].size < 2 * keys.size:
-            keys = np.concatenate([self._keys.pop(), keys])
-            values = np.concatenate([self._values.pop(), values])
+        while self._runs and self._runs[-1][0].size < 2 * keys.size:
+            run, stored = self._runs.pop()
+            keys, values = np.concatenate([run, keys]), np.concatenate([stored, values])
             # A stable sort merges two sorted halves
             order = np.argsort(keys, kind="stable")
             keys, values = keys[order], values[order]
         if keys.size:
-            self._keys.append(keys)
-            self._values.append(values)
+            self._runs.append((keys, values))
 
 
-def _fill(
-    first_value: NDArray[np.int64], value: NDArray[np.int64], group: NDArray[np.intp]
-) -> None:
-    """Fill up missing (0) first values of groups by the first one of these that is not missing."""
-    place = np.full(first_value.size, value.size)
-    # Backwards, so that the first place stays
-    given = np.flatnonzero(value > 0)[::-1]
-    place[group[given]] = given
-    is_new = (first_value == 0) & (place < value.size)
-    first_value[is_new] = value[place[is_new]]
+class _Groups:
+    """Equal keys: the sorted distinct ones, the first place of each, and the group of every key."""
 
-
-def _groups(keys: _Hashes) -> tuple[_Hashes, NDArray[np.intp], NDArray[np.intp]]:
-    """Return sorted distinct keys, the first place of each, and the group of every key."""
-    # Keys whose last bits are replaced by their places sort faster than places by keys
-    bits = np.uint64((1 << max(keys.size, 1).bit_length()) - 1)
-    places = np.arange(keys.size, dtype=np.uint64)
-    order = (np.sort((keys & ~bits) | places) & bits).astype(np.intp)
-    if np.any(keys[order[1:]] < keys[order[:-1]]):
-        order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
-    # Equal neighbours are one group
-    is_first = np.ones(keys.size, dtype=bool)
-    is_first[1:] = ordered[1:] != ordered[:-1]
-    group = np.empty(keys.size, dtype=np.intp)
-    group[order] = np.cumsum(is_first) - 1
-    return ordered[is_first], order[is_first], group
+    def __init__(self, keys: _Hashes) -> None:
+        # Keys whose last bits are replaced by their places sort faster than places by keys
+        bits = np.uint64((1 << max(keys.size, 1).bit_length()) - 1)
+        places = np.arange(keys.size, dtype=np.uint64)
+        order = (np.sort((keys & ~bits) | places) & bits).astype(np.intp)
+        if np.any(keys[order[1:]] < keys[order[:-1]]):
+            order = np.argsort(keys, kind="stable")
+        ordered = keys[order]
+        # Equal neighbours are one group
+        is_first = np.ones(keys.size, dtype=bool)
+        is_first[1:] = ordered[1:] != ordered[:-1]
+        self.keys, self.first = ordered[is_first], order[is_first]
+        self.group = np.empty(keys.size, dtype=np.intp)
+        self.group[order] = np.cumsum(is_first) - 1
 
 
 def _mixed(hashes: _Hashes) -> _Hashes:
     """Return hashes whose bits are mixed (finaliser of SplitMix64, Steele and others, 2014)."""
-    with np.errstate(over="ignore"):
-        mixed = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        return mixed ^ (mixed >> np.uint64(31))
+    mixed = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return mixed ^ (mixed >> np.uint64(31))
 
 
-def _pair_hashes(
-    numbers: Numbers, rows: NDArray[np.intp], names: list[_Hashes]
-) -> tuple[_Hashes, NDArray[np.bool_]]:
-    """Return a hash of each pair that can be told from others, and which pairs those are."""
-    # Either both buildings have names or neither counts
-    is_clear = (names[0] != 0) & (names[1] != 0)
-    ends = names
-    if not is_clear.all():
-        places = [_place_hashes(numbers, i, rows) for i in (1, 2)]
-        bodies = [_body_hashes(numbers, i, rows, places[i - 1]) for i in (1, 2)]
-        ends = [np.where(is_clear, *both) for both in zip(names, bodies, strict=True)]
-        # Pairs at one position without names are like others there
-        is_clear = is_clear | (places[0] != places[1])
-    # The same whichever building is the first
-    return _mixed(np.minimum(*ends) ^ _mixed(np.maximum(*ends)))[is_clear], is_clear
+#: Odd numbers that spread whole numbers over 64 bits (digits of pi).
+_SPREAD = (
+    0x243F6A8885A308D3,
+    0x13198A2E03707345,
+    0xA4093822299F31D1,
+    0x082EFA98EC4E6C89,
+    0x452821E638D01377,
+)
 
 
-def _whole(values: FloatArray, scale: float) -> _Hashes:
-    """Return numbers times a scale as whole numbers; missing ones and large ones are alike."""
+def _whole(values: FloatArray, scale: float, spread: int) -> _Hashes:
+    """Return numbers times a scale as whole numbers, spread; missing and large ones are alike."""
     scaled = np.rint(values * scale)
-    return np.where(np.abs(scaled) < 1e15, scaled, -1e15).astype(np.int64).view(np.uint64)
+    scaled[~(np.abs(scaled) < 1e15)] = -1e15
+    return scaled.astype(np.int64).view(np.uint64) * np.uint64(spread)
 
 
-def _place_hashes(numbers: Numbers, i: int, rows: NDArray[np.intp]) -> _Hashes:
-    """Return a hash of the position of building i to 1e-6 degrees, 0.1 m."""
-    east = _whole(numbers[f"longitude_{i}"][rows], 1e6)
-    north = _whole(numbers[f"latitude_{i}"][rows], 1e6)
-    return _mixed(east * np.uint64(400_000_001) + north)
+def _place_hashes(one: BuildingRows) -> _Hashes:
+    """Return the positions of buildings to 1e-6 degrees, 0.1 m, as one number."""
+    return _whole(one.longitude, 1e6, _SPREAD[0]) + _whole(one.latitude, 1e6, _SPREAD[1])
 
 
-def _body_hashes(numbers: Numbers, i: int, rows: NDArray[np.intp], hashes: _Hashes) -> _Hashes:
-    """Return a hash of position, height, storeys and period of building i."""
-    for name in (f"height_{i}", f"storeys_{i}", f"period_{i}"):
-        if numbers.has(name):
-            hashes = _mixed(hashes ^ _whole(numbers[name][rows], 1e3))
+def _body_hashes(one: BuildingRows, place: _Hashes) -> _Hashes:
+    """Return a hash of position, height, storeys and period of buildings."""
+    body = place
+    for values, spread in zip((one.height, one.storeys, one.period), _SPREAD[2:], strict=True):
+        body = body + _whole(values, 1e3, spread)
+    return _mixed(body)
+
+
+def _texts(one: BuildingRows, name: str) -> pa.StringArray:
+    """Return a column as texts without the blanks around them."""
+    cells = pc.fill_null(pc.cast(one.table[f"{name}{one.suffix}"], pa.string()), "")
+    return pc.utf8_trim_whitespace(pa.concat_arrays(cells.chunks))
+
+
+def _name_hashes(one: BuildingRows) -> _Hashes:
+    """Return a hash of the identifiers of buildings, 0 where one has none."""
+    if not one.has("building_id"):
+        return np.zeros(len(one.table), dtype=np.uint64)
+    texts = _texts(one, "building_id")
+    hashes = _text_hashes(texts)
+    # Words for an empty cell are no names
+    if pc.min(pc.binary_length(texts)).as_py() <= max(map(len, EMPTY)):
+        empty = pc.is_in(pc.utf8_lower(texts), value_set=pa.array(sorted(EMPTY)))
+        hashes[empty.to_numpy(zero_copy_only=False)] = 0
     return hashes
 
 
-def _name_hashes(table: pa.Table, i: int, rows: NDArray[np.intp]) -> _Hashes:
-    """Return a hash of the identifiers of building i, 0 where a building has none."""
-    name = f"building_id_{i}"
-    if name not in table.column_names or not rows.size:
-        return np.zeros(rows.size, dtype=np.uint64)
-    texts = pc.utf8_trim_whitespace(pc.cast(table[name], pa.string()))
-    # Words for an empty cell are no names
-    texts = pc.fill_null(texts if rows.size == len(table) else pc.take(texts, pa.array(rows)), "")
-    empty = pc.is_in(pc.utf8_lower(texts), value_set=pa.array(sorted(EMPTY)))
-    return np.where(empty.to_numpy(), np.uint64(0), _text_hashes(texts))
-
-
-def _text_hashes(texts: pa.ChunkedArray) -> _Hashes:
-    """Return a hash of the last 64 letters of each text, none of which is 0."""
-    texts = pc.utf8_slice_codeunits(texts, start=-64)
-    length = -(-(pc.max(pc.binary_length(texts)).as_py() or 1) // 8) * 8
-    # All of equal length, so that they are a table of words of 8 bytes
-    padded = pc.utf8_rpad(texts, length, " ").combine_chunks()
-    content = bytes(padded.buffers()[2] or b"")
-    offset = padded.offset
-    if len(content) != (offset + len(padded)) * length:
-        content = b"".join(text.encode().ljust(length) for text in texts.to_pylist())
-        offset = 0
-    words = np.frombuffer(content, dtype="<u8").reshape(-1, length // 8)[offset:]
-    hashes = np.zeros(len(words), dtype=np.uint64)
-    # Words of blanks only belong to no text, whatever the length of the others
-    for word in words.T:
-        hashes = np.where(word == _BLANKS, hashes, _mixed(hashes + word))
+def _text_hashes(texts: pa.StringArray) -> _Hashes:
+    """Return a hash of the last 256 bytes of each text, none of which is 0."""
+    _, offsets, content = texts.buffers()
+    edges = np.frombuffer(offsets, np.int32, len(texts) + 1, 4 * texts.offset)
+    length = np.minimum(np.diff(edges), 256)
+    start = edges[1:] - length
+    # Words of 8 bytes from any byte on
+    padded = bytes(content or b"") + bytes(8)
+    words = np.ndarray(len(padded) - 7, dtype="<u8", buffer=padded, strides=(1,))
+    hashes = length.astype(np.uint64)
+    for first in range(0, int(length.max()), 8):
+        rows = np.flatnonzero(length > first)
+        # Bytes beyond the end of a text belong to the next one
+        beyond = np.maximum(first + 8 - length[rows], 0).astype(np.uint64)
+        word = words[start[rows] + first] << (np.uint64(8) * beyond)
+        hashes[rows] = _mixed(hashes[rows] + word)
     return hashes | np.uint64(1)
 
 
-_BLANKS = np.frombuffer(b" " * 8, dtype="<u8")[0]
-
-
-def _signature(table: pa.Table, numbers: Numbers, i: int, rows: NDArray[np.intp]) -> _Hashes:
-    """Return the quantities of building i as one whole number each row."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        height = 1000.0 * np.log(numbers[f"height_{i}"][rows])
-        period = 50.0 * np.log(numbers[f"period_{i}"][rows]) + 256.0
+def _signature(one: BuildingRows) -> _Hashes:
+    """Return the quantities of buildings as one whole number each row."""
+    system = np.zeros(len(one.table))
+    if one.has("system"):
+        places = pc.index_in(_texts(one, "system"), value_set=pa.array(SYSTEMS))
+        system = pc.fill_null(places, -1).to_numpy() + 1.0
     # In the order of the quantities; places run in a circle
-    codes = [height, numbers[f"storeys_{i}"][rows], period, _system(table, i, rows)]
-    for name in ("longitude", "latitude"):
-        steps = numbers[f"{name}_{i}"][rows] / 2e-4
+    codes = [1000.0 * np.log(one.height), one.storeys, 50.0 * np.log(one.period) + 256.0, system]
+    for degrees in (one.longitude, one.latitude):
+        steps = degrees / 2e-4
         codes.append(steps - 4095.0 * np.floor(steps / 4095.0) + 1.0)
     # Out of range is missing
-    signature = np.zeros(rows.size, dtype=np.uint64)
+    signature = np.zeros(system.size, dtype=np.uint64)
     for quantity, code in zip(_QUANTITIES, codes, strict=True):
         inside = (code >= 1.0) & (code < 1 << quantity.bits)
         whole = np.where(inside, code, 0.0).astype(np.uint64)
         signature |= whole << np.uint64(quantity.first_bit)
     return signature
-
-
-def _system(table: pa.Table, i: int, rows: NDArray[np.intp]) -> FloatArray:
-    """Return the number of the structural system of building i, 0 where it has none."""
-    name = f"system_{i}"
-    if name not in table.column_names:
-        return np.zeros(rows.size)
-    texts = pc.utf8_trim_whitespace(pc.cast(table[name], pa.string()))
-    places = pc.fill_null(pc.index_in(texts, value_set=pa.array(SYSTEMS)), -1)
-    return np.asarray(places.to_numpy()[rows] + 1.0)

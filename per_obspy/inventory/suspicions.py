@@ -2,22 +2,30 @@
 Values of a pair table that are possible but odd: in one row, in a whole column, in several rows.
 
 One account of the rows, :class:`Suspicions`, decides for every command. It reads raw rows, before
-any is rejected, in chunks of any size; its sentences do not depend on the size.
+any is rejected, in chunks of any size; its sentences do not depend on the size. What is suspected
+is in tables: ``GAP_RULES``, ``LIMITS`` and ``COLUMN_RULES`` for columns, ``ROW_RULES`` for rows.
 """
 
-from collections import Counter, defaultdict
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import chain, product
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import METRES_PER_DEGREE
-from per_obspy.inventory.checking import LARGEST_SEPARATION
-from per_obspy.inventory.earlier_rows import EarlierRows
+from per_obspy.inventory.earlier_rows import EarlierRows, Identities, identities
+from per_obspy.inventory.quantities import (
+    FRAME_EXPONENT,
+    LINE,
+    STOREY,
+    TOWER,
+    BuildingRows,
+    PairRows,
+)
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.table_columns import joined_names
 
@@ -48,8 +56,14 @@ ROW_SUSPICIONS: dict[str, str] = {
     ),
 }
 
+#: Rows that are looked at together: their numbers stay in the processor's cache.
+BLOCK = 1 << 14
+
 #: Neighbours are sought within about this gap, m: if most gaps are wider, the unit is another one.
 WIDE_GAP = 3.0
+
+#: No number of another unit, as infinite strength is none.
+LARGEST = 1e9
 
 #: Fewest values that suggest another unit by being round, or by none of them being small.
 FEWEST = 5
@@ -61,24 +75,19 @@ FAR_APART, PER_ROOT_AREA, SMALLEST_FAR = 150.0, 2.0, 60.0
 SAME_PLACE = 0.5
 
 #: Angle between azimuth and the line between the positions, degrees: of 2 839 pairs of San José and
-#: Guatemala City 0.2 % exceed 75, the largest is 82. Below 2 m the line is not reliable.
-ACROSS, FITS, LINE = 85.0, 45.0, 2.0
+#: Guatemala City 0.2 % exceed 75, the largest is 82.
+ACROSS, FITS = 85.0, 45.0
 
-#: Heights, m: only a few towers are higher; and one storey is never as high in buildings of two
-#: and more, but 10 ft are.
-TOWER, HIGH_STOREY = 300.0, 6.5
+#: A storey is never as high in buildings of two and more, m, but 10 ft are.
+HIGH_STOREY = 6.5
 
 #: Heights of a table in feet: hardly any below this, most above that, m, and slender ones: height
 #: over distance of the centres. Reasoned: 8 ft are the least of a house, 25 m are 8 storeys.
 LOWEST_FEET, HIGH_FEET, SLENDER = 7.5, 25.0, 1.5
 
-#: Period of frames, s: 0.0466 h**0.9 (ASCE 7-16, table 12.8-2, concrete frames, h in m), and
-#: factors beyond which a row and a table are odd: stiff masonry has 0.3, base isolation 6 times it.
-FRAME_PERIOD, FRAME_EXPONENT = 0.0466, 0.9
+#: Factors of the period of frames beyond which a row and a table are odd: stiff masonry has 0.3,
+#: base isolation 6 times it.
 ODD_PERIOD, SHORT_PERIOD = 6.0, 0.3
-
-#: Height of a storey, m, where either height or storeys are unknown.
-STOREY = 3.0
 
 #: Mass of a storey, kg: one of 30 m2 and 300 kg/m2 has 9 t, one of 10 000 m2 and 2 t/m2 2e7 kg.
 STOREY_MASS = (1e4, 2e7)
@@ -91,8 +100,17 @@ CLOSE_FOR_AREA = 0.17
 #: and the distance at least, degrees.
 FEW_MIRRORED, MIRROR = 0.25, 3
 
+_CORNERS = "longitude_1 latitude_1 longitude_2 latitude_2"
+_INT_MAX = np.iinfo(np.int64).max
+_Mask = NDArray[np.bool_]
 
-class _Limit(NamedTuple):
+
+def _is_whole(numbers: FloatArray) -> _Mask:
+    """Return where numbers have no decimals."""
+    return np.asarray(numbers == np.floor(numbers))
+
+
+class Limit(NamedTuple):
     """A unit that is suspected where more than half of the numbers above 0 exceed a limit."""
 
     column: str
@@ -101,20 +119,140 @@ class _Limit(NamedTuple):
 
 
 #: Of each column the last one that holds.
-_LIMITS = (
-    _Limit("gap", WIDE_GAP, "cm"), _Limit("gap", 100.0, "mm"), _Limit("gap_std", 0.5, "cm"),
-    _Limit("height", TOWER, "cm"), _Limit("height", 5000.0, "mm"),
-    _Limit("contact_height", TOWER, "cm"), _Limit("period", 20.0, "ms"),
-    _Limit("damping", 0.3, "%"), _Limit("restitution", 1.0, "%"),
-    _Limit("participation", 3.0, "%"), _Limit("yield_coefficient", 1.0, "%"),
-    _Limit("yield_displacement", 2.0, "cm"), _Limit("facing_length", TOWER, "cm"),
-    _Limit("floor_offset", 12.0, "cm"),
+LIMITS = (
+    Limit("gap", WIDE_GAP, "cm"), Limit("gap", 100.0, "mm"), Limit("gap_std", 0.5, "cm"),
+    Limit("height", TOWER, "cm"), Limit("height", 5000.0, "mm"),
+    Limit("contact_height", TOWER, "cm"), Limit("period", 20.0, "ms"),
+    Limit("damping", 0.3, "%"), Limit("restitution", 1.0, "%"),
+    Limit("participation", 3.0, "%"), Limit("yield_coefficient", 1.0, "%"),
+    Limit("yield_displacement", 2.0, "cm"), Limit("facing_length", TOWER, "cm"),
+    Limit("floor_offset", 12.0, "cm"),
 )  # fmt: skip
 
-_UNIT_WORDS = {
-    "cm": "centimetres", "mm": "millimetres", "ms": "milliseconds", "%": "per cent",
-    "ft": "feet", "t": "tonnes or kN", "km/s": "km/s", "in": "inches",
-}  # fmt: skip
+_UNIT_WORDS = {"cm": "centimetres", "mm": "millimetres", "ms": "milliseconds", "%": "per cent"}
+
+
+class RowRule(NamedTuple):
+    """
+    Rows that are odd for one reason.
+
+    A row that a sentence on the column ``subject`` explains has none of its own; ``columns`` are
+    quoted of the first row, and the first of them must be in the table. ``#`` is the building.
+    """
+
+    flag: str
+    subject: str
+    reason: str
+    columns: str
+    is_odd: Callable[[Any], _Mask]
+    building: int = 0
+
+    def of(self, building: int) -> "RowRule":
+        """Return the rule for building 1 or 2."""
+        subject, reason, columns = (text.replace("#", str(building)) for text in self[1:4])
+        return RowRule(self.flag, subject, reason, columns, self.is_odd, building)
+
+
+def _outside(
+    quantity: str, low: float = -np.inf, high: float = np.inf, possible: float = np.inf
+) -> Callable[[Any], _Mask]:
+    """Return the test of a quantity outside a range, but possible."""
+
+    def is_odd(rows: PairRows | BuildingRows) -> _Mask:
+        values = getattr(rows, quantity)
+        return np.asarray((values < low) | ((values > high) & (values <= possible)))
+
+    return is_odd
+
+
+def _is_too_far(pair: PairRows) -> _Mask:
+    """Return pairs too far apart for neighbours, by the areas where both are known."""
+    beyond = pair.apart - PER_ROOT_AREA * pair.roots
+    by_area = (beyond > 0.0) & (pair.distance > SMALLEST_FAR)
+    return np.where(np.isnan(beyond), pair.apart > FAR_APART, by_area)
+
+
+def _is_above_roof(pair: PairRows) -> _Mask:
+    """Return contacts above the lower roof by the storeys, where no height is known."""
+    first, second = pair.buildings
+    # One storey more, as some count them above the ground floor
+    roof = 5.0 * (np.fmin(first.storeys, second.storeys) + 1.0)
+    return np.isnan(np.fmin(first.height, second.height)) & (pair.contact_height > roof)
+
+
+_PAIR_RULES = (
+    # Drawn outlines, marked as such, have whatever gap and deviation was asked for
+    RowRule(
+        "odd_gap", "gaps", f"a gap above {WIDE_GAP:g} m, in another unit?", "gap",
+        lambda pair: (pair.gap > WIDE_GAP) & (not pair.has("gap_std_source")),
+    ),
+    RowRule(
+        "odd_gap", "gap_std", "gap_std is larger than gap", "gap gap_std",
+        lambda pair: (
+            (pair.gap > 0.0) & (pair.gap_std > pair.gap) & (not pair.has("gap_std_source"))
+        ),
+    ),
+    RowRule(
+        "odd_gap", "gaps", "the gap is wider than the positions are apart", "gap",
+        lambda pair: (pair.gap > pair.distance) & (pair.distance >= SAME_PLACE),
+    ),
+    RowRule("odd_positions", "", "both buildings at one position", "longitude_1 latitude_1",
+            _outside("distance", low=SAME_PLACE)),
+    RowRule("odd_positions", "", "positions too far apart for the gap", f"{_CORNERS} gap",
+            _is_too_far),
+    # A contact may lie aside of the centres, but hardly across
+    RowRule("odd_azimuth", "azimuths",
+            "the azimuth is across or against the line between the positions",
+            f"azimuth {_CORNERS}", _outside("angle", high=ACROSS)),
+)  # fmt: skip
+
+#: Of building #. Halves of storeys are usual for attics; a twentieth of the height is a drift of
+#: collapse, not of yield.
+_BUILDING_RULES = (
+    RowRule("odd_height", "height_#", f"height_# above {TOWER:g} m", "height_#",
+            _outside("height", high=TOWER, possible=COLUMNS["height_1"].high)),
+    RowRule(
+        "odd_height", "", "storeys_# with decimals", "storeys_#",
+        lambda one: (one.storeys >= 1.0) & ~_is_whole(2.0 * one.storeys),
+    ),
+    RowRule(
+        "odd_height", "heights", f"height_# makes floors above {HIGH_STOREY:g} m, in feet?",
+        "height_# storeys_#",
+        lambda one: (one.height > HIGH_STOREY * one.storeys) & (one.storeys >= 2.0),
+    ),
+    RowRule("odd_period", "periods", "period_# does not fit the height",
+            "period_# height_# storeys_#", _outside("period_ratio", 1.0 / ODD_PERIOD, ODD_PERIOD)),
+    *(
+        RowRule("odd_building", f"{name}_#", f"{name}_# above {limit:g}", f"{name}_#",
+                _outside(name, high=limit, possible=COLUMNS[f"{name}_1"].high))
+        for name, limit in (("damping", 0.3), ("yield_coefficient", 1.0), ("participation", 2.0))
+    ),
+    RowRule("odd_building", "masses", "mass_# is odd for its storeys", "mass_#",
+            _outside("storey_mass", *STOREY_MASS)),
+    RowRule(
+        "odd_building", "yield_displacement_#", "yield_displacement_# above 5 % of the height",
+        "yield_displacement_#",
+        lambda one: (
+            (one.yield_displacement > 0.05 * np.nan_to_num(one.size, nan=20.0))
+            & np.isfinite(one.yield_displacement)
+        ),
+    ),
+)  # fmt: skip
+
+#: Rules of single rows, in the order of their sentences.
+ROW_RULES = (
+    *_PAIR_RULES,
+    *(rule.of(1) for rule in _BUILDING_RULES),
+    *(rule.of(2) for rule in _BUILDING_RULES),
+    RowRule("odd_height", "contact_height", "contact_height above the lower roof",
+            "contact_height storeys_1 storeys_2", _is_above_roof),
+    RowRule(
+        "odd_height", "floor_offset", "floor_offset above half a storey", "floor_offset",
+        # The nearest floor is at most half a storey away
+        lambda pair: np.abs(pair.floor_offset)
+        > np.where(np.isnan(pair.storey), STOREY, pair.storey / 2.0 + 0.1),
+    ),
+)  # fmt: skip
 
 #: Columns of what another row may describe otherwise.
 _SEEN_IN = {
@@ -125,124 +263,209 @@ _SEEN_IN = {
     "place": ("longitude", "latitude"),
 }
 
-_INT_MAX = np.iinfo(np.int64).max
+#: Reasons that need the earlier rows, after the others.
+_REPEATED = "the same two buildings as in an earlier row"
+_OTHERWISE = {
+    name: f"a building_id with another {name} than in an earlier row" for name in _SEEN_IN
+}
+_SUBJECTS = {rule.reason: rule.subject for rule in ROW_RULES}
+_REASONS = (*_SUBJECTS, _REPEATED, *_OTHERWISE.values())
 
 
-class _Odd(NamedTuple):
-    """Rows that are odd for one reason: flag, subject, reason, rows, quoted cells or example."""
+def _decides(one: BuildingRows) -> _Mask:
+    """Return periods that are not alike as frequencies, as those near 1 are."""
+    return (np.abs(np.log(one.period)) > 0.35) & ~np.isnan(one.period_ratio)
 
-    flag: str
+
+def _fits_as_frequency(one: BuildingRows) -> _Mask:
+    """Return periods that would fit the height better as frequencies."""
+    period, ratio = np.log(one.period), np.log(one.period_ratio)
+    # Heights in feet make periods of frames longer
+    in_feet = np.abs(ratio - FRAME_EXPONENT * np.log(0.3048))
+    as_frequency = np.abs(2.0 * period - ratio) < np.minimum(np.abs(ratio), in_feet)
+    return np.asarray(_decides(one) & as_frequency)
+
+
+def _inches(pair: PairRows) -> FloatArray:
+    """Return gaps that are inches in feet, to two decimals or more, as numbers of inches."""
+    inches = np.rint(12.0 * pair.open_gaps)
+    return inches[np.abs(12.0 * pair.open_gaps - inches) < 0.0601]
+
+
+def _fits(pair: PairRows, azimuth: FloatArray) -> _Mask:
+    """Return azimuths astray that would follow the positions in another form."""
+    return (pair.angle > FITS) & (pair.angle_to(azimuth) <= FITS)
+
+
+def _beyond_squares(pair: PairRows) -> FloatArray:
+    """Return the distance beyond that of two squares of the areas, m, NaN where it is vague."""
+    is_vague = (pair.distance < LINE) | (pair.gap > WIDE_GAP)
+    return np.where(is_vague, np.nan, pair.apart - CLOSE_FOR_AREA * pair.roots)
+
+
+#: Azimuths that are at most a circle in radians, to two decimals.
+_CIRCLE = 2.0 * np.pi + 0.01
+
+#: What is counted of a column: name of a number -> rows that count; of both buildings together.
+_COUNTED: dict[str, dict[str, Callable[[Any], _Mask]]] = {
+    "gap": {
+        "gaps": lambda pair: pair.open_gaps > 0.0,
+        "wide": lambda pair: (pair.open_gaps > WIDE_GAP) & (pair.open_gaps < LARGEST),
+        "whole": lambda pair: _is_whole(pair.open_gaps),
+        "quarters": lambda pair: _is_whole(4.0 * pair.open_gaps),
+        "metres": lambda pair: pair.open_gaps >= 1.0,
+        "twelfths": lambda pair: _inches(pair) >= 0.0,
+    },
+    # Halls of one storey may have any height
+    "storeys": {
+        "storeys": lambda one: (one.storeys >= 2.0) & (one.height > 0.0),
+        "high storeys": lambda one: (one.height > HIGH_STOREY * one.storeys) & (one.storeys >= 2.0),
+    },
+    # Numbers of storeys are whole, and often 1 or 2
+    "height": {
+        "alone": lambda one: one.alone,
+        "low": lambda one: one.lone_heights < LOWEST_FEET,
+        "high": lambda one: one.lone_heights > HIGH_FEET,
+        "apart": lambda one: one.lone_distances > 0.0,
+        "slender": lambda one: one.lone_heights > SLENDER * one.lone_distances,
+        "floors": lambda one: _is_whole(one.lone_heights) & (one.lone_heights <= 60.0),
+        "one or two": lambda one: one.lone_heights <= 2.0,
+    },
+    "period": {
+        "periods": lambda one: ~np.isnan(one.period_ratio),
+        "short": lambda one: one.period_ratio < SHORT_PERIOD,
+        "decisive": _decides,
+        "frequencies": _fits_as_frequency,
+    },
+    "mass": {
+        "masses": lambda one: one.storey_mass > 0.0,
+        "light": lambda one: one.storey_mass < STOREY_MASS[0],
+    },
+    # Azimuths that do not follow the positions, and other forms of those that do
+    "azimuth": {
+        "azimuths": lambda pair: pair.azimuth > 0.0,
+        "small": lambda pair: (pair.azimuth > 0.0) & (pair.azimuth <= _CIRCLE),
+        "decimals": lambda pair: pair.azimuth > np.floor(pair.azimuth),
+        "compared": lambda pair: pair.angle >= 0.0,
+        "astray": lambda pair: pair.angle > FITS,
+        "along the wall": lambda pair: (pair.angle > FITS) & (pair.angle < 180.0 - FITS),
+        "backwards": lambda pair: pair.angle >= 180.0 - FITS,
+        "from east": lambda pair: _fits(pair, 90.0 - pair.azimuth),
+        "in radians": lambda pair: (
+            _fits(pair, np.rad2deg(pair.azimuth)) & (pair.azimuth <= _CIRCLE)
+        ),
+    },
+    "area_1": {
+        "areas": lambda pair: ~np.isnan(_beyond_squares(pair)),
+        "close": lambda pair: _beyond_squares(pair) < 0.0,
+    },
+}
+
+
+class ColumnRule(NamedTuple):
+    """
+    Whole columns that are odd for one reason.
+
+    Of each ``group`` the first rule that holds is said; ``units`` would make the numbers plausible.
+    """
+
+    group: str
     subject: str
-    reason: str
-    rows: NDArray[np.bool_]
-    columns: tuple[str, ...]
-    example: str = ""
+    holds: Callable[[Counter[str]], bool]
+    sentence: str
+    units: tuple[tuple[str, str], ...] = ()
 
 
-class _Numbers:
-    """Columns of numbers of some rows, NaN where a cell is none."""
+_FEET = (("height_1", "ft"), ("height_2", "ft"))
 
-    def __init__(self, table: pa.Table) -> None:
-        self._table = table
-        self._missing = np.full(len(table), np.nan)
-        self._columns: dict[str, FloatArray] = {}
+GAP_RULES = (
+    ColumnRule(
+        "gap", "gaps",
+        lambda n: 2 * n["wide"] > n["gaps"] and not n["drawn"],
+        f"{{wide}} of {{gaps}} gaps above 0 are wider than {WIDE_GAP:g} m: given in centimetres or "
+        "millimetres?",
+    ),
+    # Outlines and tapes do not give round gaps only
+    ColumnRule(
+        "gap", "gaps", lambda n: FEWEST <= n["gaps"] == n["whole"],
+        "all {gaps} gaps above 0 are whole metres: given in centimetres or millimetres?",
+        (("gap", "cm"),),
+    ),
+    ColumnRule(
+        "gap", "gaps", lambda n: FEWEST < n["gaps"] == n["quarters"] < 2 * n["metres"],
+        "all {gaps} gaps above 0 are quarters of a metre, most of them above 1 m: given in inches?",
+        (("gap", "in"),),
+    ),
+    # Quarters are twelfths too, and no evidence
+    ColumnRule(
+        "gap", "gaps", lambda n: FEWEST <= n["gaps"] == n["twelfths"] and n["inches"] >= 3,
+        "all {gaps} gaps above 0 are twelfths of a metre, as inches are of a foot: given in feet?",
+        (("gap", "ft"),),
+    ),
+)  # fmt: skip
 
-    def has(self, *names: str) -> bool:
-        """Return whether the table has all these columns."""
-        return all(name in self._table.column_names for name in names)
-
-    def __getitem__(self, name: str) -> FloatArray:
-        if name not in self._columns:
-            known = numbers_of(self._table[name]) if self.has(name) else self._missing
-            self._columns[name] = known
-        return self._columns[name]
-
-    def height(self, i: int) -> FloatArray:
-        """Return heights of building i, m, from storeys where they are not given."""
-        height = self[f"height_{i}"]
-        if not self.has(f"storeys_{i}"):
-            return height
-        return np.where(np.isnan(height), STOREY * self[f"storeys_{i}"], height)
-
-    def period_ratio(self, i: int) -> FloatArray:
-        """Return periods of building i over those of frames of its height, if both are possible."""
-        name = f"ratio_{i}"
-        if name in self._columns or not self.has(f"period_{i}"):
-            return self._columns.get(name, self._missing)
-        height, period = self.height(i), self[f"period_{i}"]
-        possible = (height > 0.0) & (height <= TOWER) & (period > 0.0)
-        possible &= period <= COLUMNS[f"period_{i}"].high
-        # Few rows of most tables give periods
-        ratio = self._missing.copy()
-        ratio[possible] = period[possible] / (FRAME_PERIOD * height[possible] ** FRAME_EXPONENT)
-        self._columns[name] = ratio
-        return ratio
-
-    def storey_mass(self, i: int) -> FloatArray:
-        """Return masses of building i per storey, kg, NaN where they are not above 0."""
-        storeys = np.fmax(np.where(self.height(i) > 0.0, self.height(i) / STOREY, 1.0), 1.0)
-        counted = np.fmax(np.where(self[f"storeys_{i}"] > 0.0, self[f"storeys_{i}"], storeys), 1.0)
-        # Nothing else tells how many storeys there are: one
-        mass = self[f"mass_{i}"]
-        return np.where(mass > 0.0, mass, np.nan) / counted
-
-
-def numbers_of(cells: pa.ChunkedArray) -> FloatArray:
-    """
-    Return cells as numbers, NaN where a cell is none; text is one where it looks like one.
-
-    Examples
-    --------
-    >>> numbers_of(pa.chunked_array([["0", "0.05", "five", "", None]])).tolist()
-    [0.0, 0.05, nan, nan, nan]
-    """
-    if pa.types.is_string(cells.type) or pa.types.is_large_string(cells.type):
-        number = r"^\s*[+-]?(\d{1,300}(\.\d{0,300})?|\.\d{1,300})([eE][+-]?\d{1,3})?\s*$"
-        is_number = pc.match_substring_regex(cells, number)
-        cells = pc.utf8_trim_whitespace(pc.if_else(is_number, cells, None))
-    # Truth values and dates are no numbers
-    elif not (pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)):
-        return np.full(len(cells), np.nan)
-    numbers: FloatArray = pc.cast(cells, pa.float64(), safe=False).to_numpy()
-    return numbers
-
-
-class _Places:
-    """Positions of the pairs of some rows: distance, m, and direction, degrees from north."""
-
-    def __init__(self, numbers: _Numbers) -> None:
-        self.longitude = (numbers["longitude_1"], numbers["longitude_2"])
-        self.latitude = (numbers["latitude_1"], numbers["latitude_2"])
-        with np.errstate(invalid="ignore", over="ignore"):
-            in_range = [np.abs(degrees) <= 180.0 for degrees in self.longitude]
-            in_range += [np.abs(degrees) <= 90.0 for degrees in self.latitude]
-            # On a sphere taken as flat, across the date line too
-            north = self.latitude[1] - self.latitude[0]
-            east = _turned(self.longitude[1] - self.longitude[0])
-            east *= np.cos(np.deg2rad(self.latitude[0]))
-            distance = METRES_PER_DEGREE * np.hypot(north, east)
-        # Pairs that are too far apart are rejected
-        in_range.append(distance <= LARGEST_SEPARATION)
-        self.is_valid: NDArray[np.bool_] = np.logical_and.reduce(in_range)
-        self.distance = np.where(self.is_valid, distance, np.nan)
-        self.direction = np.rad2deg(np.arctan2(east, north))
-
-    def beyond(self, numbers: _Numbers, per_root: float) -> FloatArray:
-        """Return the distance beyond the gap and so many times the roots of the areas, m."""
-        with np.errstate(invalid="ignore"):
-            roots = np.sqrt(numbers["area_1"]) + np.sqrt(numbers["area_2"])
-        return self.distance - np.nan_to_num(np.clip(numbers["gap"], 0.0, 10.0)) - per_root * roots
-
-    def angle_to(self, azimuth: FloatArray) -> FloatArray:
-        """Return the angle between azimuths and the lines between positions, 0 to 180 degrees."""
-        with np.errstate(invalid="ignore"):
-            angle = np.abs(_turned(azimuth - self.direction))
-            return np.where(self.distance >= LINE, angle, np.nan)
+COLUMN_RULES = (
+    ColumnRule(
+        "size", "heights", lambda n: 2 * n["high storeys"] > n["storeys"],
+        f"heights: {{high storeys}} of {{storeys}} make floors above {HIGH_STOREY:g} m: given in "
+        "feet?",
+        _FEET,
+    ),
+    # Neither storeys nor periods tell it: hardly any is low, most are high and slender
+    ColumnRule(
+        "size", "heights",
+        lambda n: (
+            2 * n["slender"] >= n["apart"] and n["alone"] > FEWEST
+            and 50 * n["low"] <= n["alone"] < 2 * n["high"]
+        ),
+        f"heights: {{low}} of {{alone}} without storeys below {LOWEST_FEET:g} m, {{high}} above "
+        f"{HIGH_FEET:g} m: given in feet?",
+        _FEET,
+    ),
+    ColumnRule(
+        "size", "periods", lambda n: 2 < n["decisive"] < 2 * n["frequencies"],
+        "periods: {frequencies} of {decisive} fit the heights better as frequencies: given in Hz?",
+    ),
+    # Periods of lower buildings
+    ColumnRule(
+        "size", "periods", lambda n: 3 < n["periods"] < 2 * n["short"],
+        "periods: {short} of {periods} are far below what the heights suggest: heights given in "
+        "feet?",
+        _FEET,
+    ),
+    ColumnRule(
+        "floors", "heights", lambda n: FEWEST < n["alone"] == n["floors"] and n["one or two"] > 0,
+        "heights: all {floors} are whole metres, {one or two} of them 1 or 2: numbers of storeys?",
+    ),
+    ColumnRule(
+        "mass", "masses", lambda n: 2 * n["light"] > n["masses"],
+        f"masses: {{light}} of {{masses}} below {STOREY_MASS[0]:g} kg per storey: given in tonnes "
+        "or kN?",
+        (("mass_1", "t"), ("mass_2", "t")),
+    ),
+    # Large areas of close centres
+    ColumnRule(
+        "area", "areas", lambda n: FEWEST <= n["areas"] < 2 * n["close"],
+        "areas: {close} of {areas} pairs are too close for them: in square feet, or of all "
+        "storeys?",
+    ),
+    ColumnRule(
+        "azimuth", "azimuths",
+        lambda n: (
+            n["compared"] < 3 and FEWEST <= n["azimuths"] == n["small"] and n["decimals"] > 0
+        ),
+        "azimuths: all {azimuths} are at most 2 pi: given in radians?",
+        (("azimuth", "rad"),),
+    ),
+)  # fmt: skip
 
 
-def _turned(angle: FloatArray) -> FloatArray:
-    """Return an angle in degrees as -180 to 180."""
-    return angle - 360.0 * np.rint(angle / 360.0)
+class _Finding(NamedTuple):
+    """A suspicion of a column: what it is about, and units that would make it plausible."""
+
+    subject: str
+    sentence: str
+    units: tuple[tuple[str, str], ...] = ()
 
 
 class Suspicions:
@@ -277,7 +500,7 @@ class Suspicions:
         source : str
             File of the rows.
         table : Table
-            Raw rows in the units of the schema; numbers may be text.
+            Raw rows with numbers in the units of the schema.
         lines : (n_rows,) ndarray of int
             Of the rows in the file.
         repeated : (n_rows,) ndarray of bool
@@ -290,47 +513,41 @@ class Suspicions:
             Names of :data:`ROW_SUSPICIONS`, separated by blanks; empty for most rows.
         """
         account = self._files.setdefault(source, _FileAccount())
-        numbers = _Numbers(table)
-        place = _Places(numbers)
-        odd = [*_odd_gaps(numbers, place), *_odd_places(numbers, place)]
-        for i in (1, 2):
-            odd += [*_odd_sizes(numbers, i), *_odd_oscillators(numbers, i)]
-            odd += _odd_masses(numbers, i)
-        odd += [*_odd_contacts(numbers), *self._repeated(table, numbers, place, lines, repeated)]
-        # Count the odd rows, then whole columns
-        found = [one for one in odd if one.rows.any()]
-        account.add_rows(found, table, lines)
-        account.add_columns(numbers, place, lines)
-        if not found:
-            return np.full(len(table), "", dtype=object)
-        # Flags of a row in the order of their meanings
         flags = {name: np.zeros(len(table), dtype=bool) for name in ROW_SUSPICIONS}
-        for one in found:
-            flags[one.flag] |= one.rows
+        blocks = list[Identities]()
+        # What a row says by itself, then what earlier ones say
+        for start in range(0, len(table), BLOCK):
+            here = slice(start, start + BLOCK)
+            pair = PairRows(table.slice(start, BLOCK))
+            # Numbers of any size are possible in raw rows
+            with np.errstate(all="ignore"):
+                account.add(pair, lines[here], {name: flags[name][here] for name in flags})
+                comparable = ~np.isnan(pair.distance) & ~repeated[here]
+                blocks.append(identities(pair, comparable, start))
+        if blocks:
+            self._compare(account, Identities.joined(blocks), table, lines, flags)
         return joined_names(flags)
 
-    def _repeated(
+    def _compare(
         self,
+        account: "_FileAccount",
+        found: Identities,
         table: pa.Table,
-        numbers: _Numbers,
-        place: _Places,
         lines: NDArray[np.int64],
-        repeated: NDArray[np.bool_],
-    ) -> Iterator[_Odd]:
-        """Yield rows with a pair or a building that an earlier row has."""
-        comparable = place.is_valid & ~repeated
-        again, earlier, contradicting = self._earlier.compare(table, numbers, comparable, lines)
-        reason = "the same two buildings as in an earlier row"
-        # Its line in the file of the earlier row
-        first = int(earlier[np.argmax(again)]) if again.any() else 0
-        yield _Odd("repeated_pair", "", reason, again, (), f"as line {first}")
+        flags: dict[str, _Mask],
+    ) -> None:
+        """Add rows with a pair or a building that an earlier row has."""
+        again, earlier = self._earlier.repeated_pairs(found, lines)
+        flags["repeated_pair"][again] = True
+        if again.size:
+            account.add_odd(_REPEATED, again, lines, lambda _: f"as line {earlier[0]}")
         # Each difference of either building
-        for name, buildings in contradicting.items():
-            rows: NDArray[np.bool_] = np.logical_or(buildings[:, 0], buildings[:, 1])
-            i = int(np.argmax(buildings[np.argmax(rows)])) + 1
-            reason = f"a building_id with another {name} than in an earlier row"
-            columns = tuple(f"{column}_{i}" for column in ("building_id", *_SEEN_IN[name]))
-            yield _Odd("contradicting_building", "", reason, rows, columns)
+        for name, buildings in self._earlier.contradictions(found).items():
+            odd = np.flatnonzero(np.bincount(buildings // 2))
+            flags["contradicting_building"][odd] = True
+            columns = [f"{column}_{buildings[0] % 2 + 1}" for column in _SEEN_IN[name]]
+            columns = [f"building_id_{buildings[0] % 2 + 1}", *columns]
+            account.add_odd(_OTHERWISE[name], odd, lines, partial(_quoted, table, columns))
 
     def sentences(self) -> list[str]:
         """Return a sentence per suspicion, with the file's name where there are several."""
@@ -349,418 +566,133 @@ class Suspicions:
         return units
 
 
-# numpy compares NaN as false, which is meant throughout the rules: a missing value is not odd.
-
-
-def _odd_gaps(numbers: _Numbers, place: _Places) -> Iterator[_Odd]:
-    """Yield rows with a gap that is possible but odd."""
-    gap, deviation = numbers["gap"], numbers["gap_std"]
-    # Drawn outlines, marked as such, have whatever gap and deviation was asked for
-    if not numbers.has("gap_std_source"):
-        wide = gap > WIDE_GAP
-        yield _Odd(
-            "odd_gap", "gaps", f"a gap above {WIDE_GAP:g} m, in another unit?", wide, ("gap",)
-        )
-        if numbers.has("gap_std"):
-            unsure = (gap > 0.0) & (deviation > gap)
-            yield _Odd(
-                "odd_gap", "gap_std", "gap_std is larger than gap", unsure, ("gap", "gap_std")
-            )
-    beyond = (gap > place.distance) & (place.distance >= SAME_PLACE)
-    yield _Odd("odd_gap", "gaps", "the gap is wider than the positions are apart", beyond, ("gap",))
-
-
-def _odd_places(numbers: _Numbers, place: _Places) -> Iterator[_Odd]:
-    """Yield rows with positions or an azimuth that do not fit neighbours."""
-    corners = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
-    equal = place.distance < SAME_PLACE
-    yield _Odd("odd_positions", "", "both buildings at one position", equal, corners[:2])
-    # By the areas where both are known
-    far = place.distance - np.nan_to_num(np.clip(numbers["gap"], 0.0, 10.0)) > FAR_APART
-    if numbers.has("area_1", "area_2"):
-        beyond = place.beyond(numbers, PER_ROOT_AREA)
-        far = np.where(np.isnan(beyond), far, (beyond > 0.0) & (place.distance > SMALLEST_FAR))
-    columns = (*corners, "gap")
-    yield _Odd("odd_positions", "", "positions too far apart for the gap", far, columns)
-    # A contact may lie aside of the centres, but hardly across
-    if numbers.has("azimuth"):
-        across = place.angle_to(numbers["azimuth"]) > ACROSS
-        reason = "the azimuth is across or against the line between the positions"
-        yield _Odd("odd_azimuth", "azimuths", reason, across, ("azimuth", *corners))
-
-
-def _odd_sizes(numbers: _Numbers, i: int) -> Iterator[_Odd]:
-    """Yield rows with an odd height or number of storeys of building i."""
-    names = height_name, storeys_name = f"height_{i}", f"storeys_{i}"
-    height, storeys = numbers[height_name], numbers[storeys_name]
-    # Higher ones are rejected
-    tower = (height > TOWER) & (height <= COLUMNS[height_name].high)
-    yield _Odd("odd_height", height_name, f"{height_name} above {TOWER:g} m", tower, names[:1])
-    if not numbers.has(storeys_name):
-        return
-    # Halves are usual for attics
-    decimals = (storeys >= 1.0) & (2.0 * storeys != np.floor(2.0 * storeys))
-    yield _Odd("odd_height", "", f"{storeys_name} with decimals", decimals, names[1:])
-    high = (height > HIGH_STOREY * storeys) & (storeys >= 2.0)
-    reason = f"{height_name} makes floors above {HIGH_STOREY:g} m, in feet?"
-    yield _Odd("odd_height", "heights", reason, high, names)
-
-
-def _odd_contacts(numbers: _Numbers) -> Iterator[_Odd]:
-    """Yield rows with an odd contact height or floor offset."""
-    if numbers.has("contact_height"):
-        # One storey more, as some count them above the ground floor
-        storeys = np.fmin(numbers["storeys_1"], numbers["storeys_2"])
-        unknown = np.isnan(np.fmin(numbers["height_1"], numbers["height_2"]))
-        above = unknown & (numbers["contact_height"] > 5.0 * (storeys + 1.0))
-        columns = ("contact_height", "storeys_1", "storeys_2")
-        reason = "contact_height above the lower roof"
-        yield _Odd("odd_height", "contact_height", reason, above, columns)
-    if numbers.has(name := "floor_offset"):
-        # The nearest floor is at most half a storey away
-        with np.errstate(divide="ignore", invalid="ignore"):
-            storey = np.fmax(*(numbers[f"height_{i}"] / numbers[f"storeys_{i}"] for i in (1, 2)))
-        half = np.where(np.isnan(storey), STOREY, storey / 2.0 + 0.1)
-        large = np.abs(numbers[name]) > half
-        yield _Odd("odd_height", name, f"{name} above half a storey", large, (name,))
-
-
-def _odd_oscillators(numbers: _Numbers, i: int) -> Iterator[_Odd]:
-    """Yield rows with an odd period, damping, strength or participation of building i."""
-    # Stiffer or softer than any building but an isolated one
-    ratio = numbers.period_ratio(i)
-    odd = (ratio > ODD_PERIOD) | (ratio < 1.0 / ODD_PERIOD)
-    sizes = [name for name in (f"height_{i}", f"storeys_{i}") if numbers.has(name)]
-    reason = f"period_{i} does not fit the height"
-    yield _Odd("odd_period", "periods", reason, odd, (f"period_{i}", *sizes))
-    # Limits of single values
-    for name, limit in {"damping": 0.3, "yield_coefficient": 1.0, "participation": 2.0}.items():
-        if numbers.has(column := f"{name}_{i}"):
-            above = (numbers[column] > limit) & (numbers[column] <= COLUMNS[column].high)
-            yield _Odd("odd_building", column, f"{column} above {limit:g}", above, (column,))
-
-
-def _odd_masses(numbers: _Numbers, i: int) -> Iterator[_Odd]:
-    """Yield rows with an odd mass or yield displacement of building i."""
-    if numbers.has(column := f"mass_{i}"):
-        mass = numbers.storey_mass(i)
-        odd = (mass < STOREY_MASS[0]) | (mass > STOREY_MASS[1])
-        yield _Odd("odd_building", "masses", f"{column} is odd for its storeys", odd, (column,))
-    if numbers.has(column := f"yield_displacement_{i}"):
-        # A twentieth of the height is a drift of collapse, not of yield
-        far = numbers[column] > 0.05 * np.nan_to_num(numbers.height(i), nan=20.0)
-        far &= np.isfinite(numbers[column])
-        yield _Odd("odd_building", column, f"{column} above 5 % of the height", far, (column,))
-
-
 class _FileAccount:
     """Numbers of rows of one file that each rule counts."""
 
     def __init__(self) -> None:
         self.rows = 0
-        # Odd rows: their number, and the first as text, by subject and reason
-        self._odd: Counter[tuple[str, str]] = Counter()
-        self._first: dict[tuple[str, str], str] = {}
-        # Numbers by column and by what is counted
-        self._count: defaultdict[str, Counter[str]] = defaultdict(Counter)
-        self._twelfths: set[int] = set()
+        # Odd rows: their number, and the first as text, by reason
+        self._odd = Counter[str]()
+        self._first: dict[str, str] = {}
+        # Numbers of what is counted in columns
+        self._count = Counter[str]()
+        self._inches: set[float] = set()
         self._is_drawn = False
+        # Numbers of columns above limits, and those above 0
+        self._limits = Counter[tuple[str, Limit, str]]()
         # Pairs by degrees of longitude and latitude, and the first line of each
         self._cells = np.zeros(360 * 180, dtype=np.int64)
         self._cell_line = np.full(360 * 180, _INT_MAX)
 
-    def add_rows(self, found: list[_Odd], table: pa.Table, lines: NDArray[np.int64]) -> None:
-        """Add rows that are odd by themselves."""
-        self.rows += len(table)
-        for one in found:
-            key = one.subject, one.reason
-            self._odd[key] += _number(one.rows)
-            if key not in self._first:
-                # Later chunks do not change the first one
-                row = int(np.argmax(one.rows))
-                cells = [_quoted(table, name, row) for name in one.columns]
-                quoted = one.example or ", ".join(cells)
-                self._first[key] = f"first in line {lines[row]}: {quoted}"
+    def add(self, pair: PairRows, lines: NDArray[np.int64], flags: dict[str, _Mask]) -> None:
+        """Add a block of rows, and set the flags of those that are odd by themselves."""
+        self.rows += len(lines)
+        # Single rows
+        for rule in ROW_RULES:
+            columns = [*filter(pair.has, rule.columns.split())]
+            if rule.columns.startswith(tuple(columns[:1])):
+                is_odd = rule.is_odd(pair.buildings[rule.building - 1] if rule.building else pair)
+                if is_odd.any():
+                    flags[rule.flag] |= is_odd
+                    example = partial(_quoted, pair.table, columns)
+                    self.add_odd(rule.reason, np.flatnonzero(is_odd), lines, example)
+        # Whole columns, of both buildings together
+        for rows in (pair, *pair.buildings):
+            self._add_limits(rows)
+            for column, tests in _COUNTED.items():
+                for number, is_counted in tests.items() if rows.has(column) else ():
+                    self._count[number] += int(np.count_nonzero(is_counted(rows)))
+        self._add_gaps(pair)
+        self._add_cells(pair, lines)
 
-    def add_columns(self, numbers: _Numbers, place: _Places, lines: NDArray[np.int64]) -> None:
-        """Add the counts of whole columns."""
-        self._add_limits(numbers)
-        self._add_gaps(numbers["gap"])
-        self._is_drawn |= numbers.has("gap_std_source")
-        # Quantities of buildings and of their places
-        for i in (1, 2):
-            self._add_building(numbers, place, i)
-        if numbers.has("azimuth"):
-            self._add_azimuths(numbers["azimuth"], place)
-        if numbers.has("area_1", "area_2"):
-            beyond = place.beyond(numbers, CLOSE_FOR_AREA)
-            beyond[(place.distance < LINE) | (numbers["gap"] > WIDE_GAP)] = np.nan
-            self._count["area"]["all"] += _number(~np.isnan(beyond))
-            self._count["area"]["close"] += _number(beyond < 0.0)
-        self._add_cells(place, lines)
+    def add_odd(
+        self,
+        reason: str,
+        odd: NDArray[np.intp],
+        lines: NDArray[np.int64],
+        example: Callable[[int], str],
+    ) -> None:
+        """Add rows that are odd for a reason, with an example of the first."""
+        self._odd[reason] += odd.size
+        # Later blocks do not change the first one
+        if reason not in self._first:
+            row = int(odd[0])
+            self._first[reason] = f"first in line {lines[row]}: {example(row)}"
 
-    def _add_limits(self, numbers: _Numbers) -> None:
-        """Add the numbers above limits."""
-        for name in (one for one in COLUMNS if numbers.has(one)):
-            bare = name.removesuffix("_1").removesuffix("_2")
-            if limits := [limit.above for limit in _LIMITS if limit.column == bare]:
-                # Infinite strength is no number of another unit
-                values, count = np.abs(numbers[name]), self._count[name]
-                values = np.where(values < 1e9, values, 0.0)
-                count["above 0"] += _number(values > 0.0)
-                for above in limits:
-                    count[f"above {above}"] += _number(values > above)
+    def _add_limits(self, rows: PairRows | BuildingRows) -> None:
+        """Add the numbers above limits, and those above 0."""
+        # A column may have several limits
+        for limit in LIMITS:
+            if rows.has(limit.column):
+                numbers = np.abs(getattr(rows, limit.column))
+                is_number, name = numbers < LARGEST, limit.column + rows.suffix
+                for number, least in (("above", limit.above), ("positive", 0.0)):
+                    self._limits[name, limit, number] += int(
+                        np.count_nonzero(is_number & (numbers > least))
+                    )
 
-    def _add_gaps(self, gap: FloatArray) -> None:
-        """Add the numbers of gaps that are round in metres, in quarters and in twelfths."""
-        gap = gap[gap > 0.0]
-        count = self._count["gap"]
-        count["all"] += gap.size
-        count["whole"] += _number(gap == np.floor(gap))
-        count["quarters"] += _number(4.0 * gap == np.floor(4.0 * gap))
-        count["metres"] += _number(gap >= 1.0)
-        # Inches in feet, to two decimals or more
-        twelfths = np.rint(12.0 * gap)
-        is_twelfth = np.abs(12.0 * gap - twelfths) < 0.0601
-        count["twelfths"] += _number(is_twelfth)
-        if len(self._twelfths) < 6:
-            # Quarters are twelfths too, and no evidence
-            inches = np.unique(twelfths[is_twelfth & (twelfths <= 120.0)])
-            self._twelfths |= {int(inch) for inch in inches.tolist() if inch % 3}
+    def _add_gaps(self, pair: PairRows) -> None:
+        """Add the kinds of inches that gaps are; quarters are twelfths too, and no evidence."""
+        self._is_drawn |= pair.has("gap_std_source")
+        inches = _inches(pair) if len(self._inches) < FEWEST else np.empty(0)
+        self._inches |= set(inches[(inches <= 120.0) & (inches % 3.0 > 0.0)].tolist())
 
-    def _add_building(self, numbers: _Numbers, place: _Places, i: int) -> None:
-        """Add the numbers of odd storeys, periods and masses, and heights without them."""
-        # Halls of one storey may have any height
-        height, storeys = numbers[f"height_{i}"], numbers[f"storeys_{i}"]
-        count, mass_count = self._count["height"], self._count["mass"]
-        counted = (storeys >= 2.0) & (height > 0.0)
-        count["storeys"] += _number(counted)
-        count["high storeys"] += _number(counted & (height > HIGH_STOREY * storeys))
-        # Periods and masses by the height
-        period = numbers[f"period_{i}"]
-        self._add_periods(period, numbers.period_ratio(i))
-        if numbers.has(f"mass_{i}"):
-            mass = numbers.storey_mass(i)
-            mass_count["all"] += _number(mass > 0.0)
-            mass_count["light"] += _number(mass < STOREY_MASS[0])
-        alone = (height > 0.0) & (height < 1e6) & np.isnan(storeys) & np.isnan(period)
-        if alone.any():
-            self._add_heights(height[alone], place.distance[alone])
-
-    def _add_heights(self, height: FloatArray, distance: FloatArray) -> None:
-        """Add heights without storeys and period, which may be in feet, or numbers of storeys."""
-        count = self._count["height"]
-        count["alone"] += height.size
-        count["low"] += _number(height < LOWEST_FEET)
-        count["high"] += _number(height > HIGH_FEET)
-        count["apart"] += _number(distance >= LINE)
-        count["slender"] += _number((distance >= LINE) & (height > SLENDER * distance))
-        # Numbers of storeys are whole, and often 1 or 2
-        count["whole"] += _number((height == np.floor(height)) & (height <= 60.0))
-        count["one or two"] += _number(height <= 2.0)
-
-    def _add_periods(self, period: FloatArray, ratio: FloatArray) -> None:
-        """Add the numbers of periods that are too short, or would fit as frequencies."""
-        count = self._count["period"]
-        possible = ~np.isnan(ratio)
-        period, ratio = np.log(period[possible]), np.log(ratio[possible])
-        # Period and frequency are alike near 1; heights in feet make periods of frames longer
-        decides = np.abs(period) > 0.35
-        in_feet = np.abs(ratio - FRAME_EXPONENT * np.log(0.3048))
-        as_frequency = np.abs(2.0 * period - ratio) < np.minimum(np.abs(ratio), in_feet)
-        count["all"] += period.size
-        count["decides"] += _number(decides)
-        count["frequency"] += _number(decides & as_frequency)
-        count["short"] += _number(ratio < np.log(SHORT_PERIOD))
-
-    def _add_azimuths(self, azimuth: FloatArray, place: _Places) -> None:
-        """Add the numbers of azimuths that do not fit the positions, and of other forms that do."""
-        count = self._count["azimuth"]
-        angle = place.angle_to(azimuth)
-        astray = angle > FITS
-        count["compared"] += _number(angle >= 0.0)
-        count["astray"] += _number(astray)
-        count["along the wall"] += _number(astray & (angle < 180.0 - FITS))
-        # A circle has 2 pi radians, to two decimals
-        small = azimuth <= 2.0 * np.pi + 0.01
-        count["all"] += _number(azimuth > 0.0)
-        count["small"] += _number(small & (azimuth > 0.0))
-        count["decimals"] += _number(azimuth % 1.0 > 0.0)
-        # Other forms of the azimuths that do not fit
-        if astray.any():
-            east = np.where(astray, 90.0 - azimuth, np.nan)
-            radians = np.where(astray & small, np.rad2deg(azimuth), np.nan)
-            count["from east"] += _number(place.angle_to(east) <= FITS)
-            count["in radians"] += _number(place.angle_to(radians) <= FITS)
-
-    def _add_cells(self, place: _Places, lines: NDArray[np.int64]) -> None:
+    def _add_cells(self, pair: PairRows, lines: NDArray[np.int64]) -> None:
         """Add the pairs of each cell of one degree."""
-        valid = place.is_valid
-        east, north = place.longitude[0][valid], place.latitude[0][valid]
-        cell = np.clip(np.floor(east) + 180, 0, 359) * 180 + np.clip(np.floor(north) + 90, 0, 179)
-        code = cell.astype(np.int64)
-        self._cells += np.bincount(code, minlength=360 * 180)
-        # Backwards, so that the first line of a new cell stays
-        is_new = self._cell_line[code] == _INT_MAX
-        if is_new.any():
-            self._cell_line[code[is_new][::-1]] = lines[valid][is_new][::-1]
+        valid = ~np.isnan(pair.distance)
+        east = np.floor(pair.buildings[0].longitude[valid]) + 180.0
+        north = np.floor(pair.buildings[0].latitude[valid]) + 90.0
+        # The last cells have both of their edges
+        cell = (np.minimum(east, 359.0) * 180.0 + np.minimum(north, 179.0)).astype(np.int64)
+        self._cells += np.bincount(cell, minlength=360 * 180)
+        # Lines come in their order: a cell keeps its first one
+        is_new = self._cell_line[cell] == _INT_MAX
+        np.minimum.at(self._cell_line, cell[is_new], lines[valid][is_new])
 
-    def _limits(self) -> Iterator[tuple[str, _Limit, int, int]]:
-        """Yield columns with a limit, the numbers above it and those above 0."""
-        for limit in _LIMITS:
-            for name in (limit.column, f"{limit.column}_1", f"{limit.column}_2"):
-                count = self._count.get(name, Counter())
-                # Outlines have whatever gap was asked for, with decimals
-                drawn = name == "gap" and self._is_drawn and count["whole"] < count["all"]
-                if count and not drawn:
-                    yield name, limit, count[f"above {limit.above}"], count["above 0"]
+    def _findings(self) -> list[_Finding]:
+        """Return the suspicions of columns, in the order of their sentences."""
+        n = self._count.copy()
+        # Outlines have whatever gap was asked for, with decimals
+        n["drawn"] = int(self._is_drawn and n["whole"] < n["gaps"])
+        n["inches"] = len(self._inches)
+        findings = [*_by_rules(GAP_RULES, n), *self._by_limits(bool(n["drawn"]))]
+        return [*findings, *_by_rules(COLUMN_RULES, n), *_astray_azimuths(n)]
+
+    def _by_limits(self, is_drawn: bool) -> list[_Finding]:
+        """Return the columns that mostly exceed a limit; the gaps without a sentence."""
+        findings = dict[str, _Finding]()
+        for limit, suffix in product(LIMITS, ("", "_1", "_2")):
+            name = limit.column + suffix
+            # More than half of those above 0
+            above, every = (self._limits[name, limit, one] for one in ("above", "positive"))
+            if 2 * above > every and not (name == "gap" and is_drawn):
+                unit = COLUMNS[name].unit.replace("1", "")
+                of = f"{above} of {every} above {limit.above:g} {unit}".strip()
+                sentence = f"{name}: {of}: given in {_UNIT_WORDS[limit.unit]}?"
+                # Of several limits the last one
+                said = "" if name == "gap" else sentence
+                findings[name] = _Finding(name, said, ((name, limit.unit),))
+        return list(findings.values())
 
     def units(self) -> dict[str, str]:
-        """Return the units that the columns may have."""
-        columns = self._limits()
-        units = {name: limit.unit for name, limit, above, every in columns if 2 * above > every}
-        if unit := self._round_gaps()[0]:
-            units.setdefault("gap", unit)
-        # Of both buildings together
-        for i in (1, 2):
-            if self._feet()[0]:
-                units.setdefault(f"height_{i}", "ft")
-            if self._is_light():
-                units.setdefault(f"mass_{i}", "t")
-        if self._azimuth_form() == "in radians":
-            units["azimuth"] = "rad"
+        """Return the units that the columns may have; those by limits are more certain."""
+        units = dict[str, str]()
+        for name, unit in chain.from_iterable(finding.units for finding in self._findings()):
+            units.setdefault(name, unit)
         return units
-
-    def _round_gaps(self) -> tuple[str, str]:
-        """Return unit and reason of gaps that are too round for metres, empty if none are."""
-        count = self._count["gap"]
-        every = count["all"]
-        if every < FEWEST:
-            return "", ""
-        # Outlines and tapes do not give round gaps only
-        if count["whole"] == every:
-            return "cm", "are whole metres: given in centimetres or millimetres"
-        if every > FEWEST and count["quarters"] == every and 2 * count["metres"] > every:
-            return "in", "are quarters of a metre, most of them above 1 m: given in inches"
-        if count["twelfths"] == every and len(self._twelfths) >= 3:
-            return "ft", "are twelfths of a metre, as inches are of a foot: given in feet"
-        return "", ""
-
-    def _feet(self) -> tuple[str, str]:
-        """Return why heights may be in feet, with the subject; empty if they may not."""
-        count, period = self._count["height"], self._count["period"]
-        if 2 * count["high storeys"] > count["storeys"]:
-            of = f"{count['high storeys']} of {count['storeys']} make"
-            return "heights", f"{of} floors above {HIGH_STOREY:g} m"
-        # Neither storeys nor periods tell it: hardly any is low, most are high and slender
-        alone, low, high = count["alone"], count["low"], count["high"]
-        if (
-            2 * count["slender"] >= count["apart"]
-            and alone > FEWEST
-            and 50 * low <= alone < 2 * high
-        ):
-            of = f"{low} of {alone} without storeys below {LOWEST_FEET:g} m"
-            return "heights", f"{of}, {high} above {HIGH_FEET:g} m"
-        # Periods of lower buildings
-        if 3 < period["all"] < 2 * period["short"]:
-            short = f"{period['short']} of {period['all']}"
-            return "periods", f"{short} are far below what the heights suggest"
-        return "", ""
-
-    def _is_light(self) -> bool:
-        """Return whether most masses are too small for kilograms."""
-        return 2 * self._count["mass"]["light"] > self._count["mass"]["all"]
-
-    def _azimuth_form(self) -> str:
-        """Return the form in which azimuths fit the positions, empty if it is the right one."""
-        count = self._count["azimuth"]
-        compared, astray, every = count["compared"], count["astray"], count["all"]
-        if compared >= 3:
-            # Where the azimuth of an axis is given, half of them point backwards
-            if 4 * astray < compared:
-                return ""
-            forms = ("in radians", "backwards", "from east", "along the wall")
-            count["backwards"] = astray - count["along the wall"]
-            best = max(forms, key=lambda form: count[form])
-            return best if 10 * count[best] >= 9 * astray else "any way"
-        is_small = every >= FEWEST and count["small"] == every and count["decimals"]
-        return "in radians" if is_small else ""
 
     def sentences(self) -> list[str]:
         """Return a sentence per suspicion, of columns first: their rows are not repeated."""
-        columns = [*self._gap_sentence(), *self._limit_sentences(), *self._height_sentence()]
-        columns += [*self._mass_sentences(), *self._azimuth_sentence()]
-        explained = {subject for subject, _ in columns}
-        # Odd rows by their reason
+        findings = self._findings()
+        explained = {finding.subject for finding in findings}
         rows = [
-            f"{reason}: {count} of {self.rows} rows, {self._first[subject, reason]}"
-            for (subject, reason), count in self._odd.items()
-            if subject not in explained
+            f"{reason}: {self._odd[reason]} of {self.rows} rows, {self._first[reason]}"
+            for reason in _REASONS
+            if reason in self._odd and _SUBJECTS.get(reason, "") not in explained
         ]
-        return [*(sentence for _, sentence in columns), *self._mirrored(), *rows]
-
-    def _gap_sentence(self) -> Iterator[tuple[str, str]]:
-        """Yield a sentence about gaps that are wide or round, with its subject."""
-        wide, every = self._count["gap"][f"above {WIDE_GAP}"], self._count["gap"]["all"]
-        unit, reason = self._round_gaps()
-        # Wide ones are more certain
-        if 2 * wide > every and "gap" in self.units():
-            mend = "given in centimetres or millimetres?"
-            yield "gaps", f"{wide} of {every} gaps above 0 are wider than {WIDE_GAP:g} m: {mend}"
-        elif unit:
-            yield "gaps", f"all {every} gaps above 0 {reason}?"
-
-    def _limit_sentences(self) -> Iterator[tuple[str, str]]:
-        """Yield a sentence per column that mostly exceeds a limit, with its subject."""
-        units = self.units()
-        for name, limit, above, every in self._limits():
-            # Of several limits the last one
-            if 2 * above > every and units[name] == limit.unit and name != "gap":
-                unit = COLUMNS[name].unit.replace("1", "")
-                of = f"{above} of {every} above {limit.above:g} {unit}".strip()
-                yield name, f"{name}: {of}: given in {_UNIT_WORDS[limit.unit]}?"
-
-    def _height_sentence(self) -> Iterator[tuple[str, str]]:
-        """Yield a sentence about heights and periods together, with its subject."""
-        height, period = self._count["height"], self._count["period"]
-        subject, feet = self._feet()
-        whole, few = height["whole"], height["one or two"]
-        # Storeys decide before periods do
-        if subject == "heights":
-            yield subject, f"heights: {feet}: given in feet?"
-        elif period["decides"] > 2 and 2 * period["frequency"] > period["decides"]:
-            of = f"{period['frequency']} of {period['decides']}"
-            yield "periods", f"periods: {of} fit the heights better as frequencies: given in Hz?"
-        elif subject:
-            yield subject, f"periods: {feet}: heights given in feet?"
-        # Heights that are numbers of storeys
-        if height["alone"] > FEWEST and whole == height["alone"] and few:
-            of = f"all {whole} are whole metres, {few} of them 1 or 2"
-            yield "heights", f"heights: {of}: numbers of storeys?"
-
-    def _mass_sentences(self) -> Iterator[tuple[str, str]]:
-        """Yield sentences about masses and areas, with the subjects."""
-        mass, area = self._count["mass"], self._count["area"]
-        if self._is_light():
-            of = f"{mass['light']} of {mass['all']} below {STOREY_MASS[0]:g} kg per storey"
-            yield "masses", f"masses: {of}: given in tonnes or kN?"
-        # Large areas of close centres
-        if area["all"] >= FEWEST and 2 * area["close"] > area["all"]:
-            of = f"{area['close']} of {area['all']} pairs are too close for them"
-            yield "areas", f"areas: {of}: in square feet, or of all storeys?"
-
-    def _azimuth_sentence(self) -> Iterator[tuple[str, str]]:
-        """Yield a sentence about azimuths that do not follow the positions, with its subject."""
-        form, count = self._azimuth_form(), self._count["azimuth"]
-        meant = "degrees clockwise from north, from building 1 to building 2, are expected"
-        if form == "in radians" and count["compared"] < 3:
-            yield "azimuths", f"azimuths: all {count['all']} are at most 2 pi: given in radians?"
-        elif form:
-            # How many would follow the positions in another form
-            others = f"{count['astray']} of {count['compared']} do not follow the positions"
-            east = " counter-clockwise" if form == "from east" else ""
-            better = f", {count[form]} would if given {form}{east}" if count[form] else ""
-            yield "azimuths", f"azimuths: {others}{better}: {meant}"
+        # Gaps above a limit are said by their own rule
+        of_columns = [finding.sentence for finding in findings if finding.sentence]
+        return [*of_columns, *self._mirrored(), *rows]
 
     def _mirrored(self) -> Iterator[str]:
         """Yield a sentence per way in which few pairs mirror the place of many."""
@@ -793,16 +725,42 @@ class _FileAccount:
         return np.asarray(grid[columns[:, :, None], rows[:, None, :]].sum(axis=(1, 2)))
 
 
-def _number(mask: NDArray[np.bool_]) -> int:
-    """Return how many are true."""
-    return int(np.count_nonzero(mask))
+def _by_rules(rules: tuple[ColumnRule, ...], n: Counter[str]) -> list[_Finding]:
+    """Return what the rules of columns find, at most one of each group."""
+    found = dict[str, _Finding]()
+    for rule in rules:
+        if rule.group not in found and rule.holds(n):
+            sentence = rule.sentence.format_map(n)
+            found[rule.group] = _Finding(rule.subject, sentence, rule.units)
+    return list(found.values())
 
 
-def _quoted(table: pa.Table, name: str, row: int) -> str:
-    """Return a cell as it is quoted in a sentence."""
-    value = table[name][row].as_py() if name in table.column_names else ""
-    # Text of a number stays as it is
-    if isinstance(value, float):
-        unit = COLUMNS[name].unit.replace("1", "").replace("degrees", "")
-        return f"{name} = {value:.9g} {unit}".rstrip()
-    return f"{name} = {str(value).strip()!r:.40}"
+def _astray_azimuths(n: Counter[str]) -> Iterator[_Finding]:
+    """Yield a suspicion of azimuths that do not follow the positions."""
+    # Where the azimuth of an axis is given, half of them point backwards
+    if n["compared"] < 3 or 4 * n["astray"] < n["compared"]:
+        return
+    forms = ("in radians", "backwards", "from east", "along the wall")
+    best = max(forms, key=lambda form: n[form])
+    others = f"{n['astray']} of {n['compared']} do not follow the positions"
+    # How many would follow the positions in another form
+    if 10 * n[best] >= 9 * n["astray"]:
+        east = " counter-clockwise" if best == "from east" else ""
+        others += f", {n[best]} would if given {best}{east}"
+    meant = "degrees clockwise from north, from building 1 to building 2, are expected"
+    units = (("azimuth", "rad"),) if others.endswith("in radians") else ()
+    yield _Finding("azimuths", f"azimuths: {others}: {meant}", units)
+
+
+def _quoted(table: pa.Table, columns: Iterable[str], row: int) -> str:
+    """Return the cells of a row as they are quoted in a sentence."""
+    cells = []
+    for name in columns:
+        value = table[name][row].as_py()
+        text = f"{str(value).strip()!r:.40}"
+        # Text of a number stays as it is
+        if isinstance(value, float):
+            unit = COLUMNS[name].unit.replace("1", "").replace("degrees", "")
+            text = f"{value:.9g} {unit}".rstrip()
+        cells.append(f"{name} = {text}")
+    return ", ".join(cells)

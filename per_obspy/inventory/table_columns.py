@@ -4,9 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import METRES_PER_DEGREE
 
 
 def numbers_in(pairs: pd.DataFrame, name: str) -> FloatArray:
@@ -39,13 +40,27 @@ def joined_names(rows: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]:
     ['a b', '', 'a']
     """
     # Each row's combination of flags as a whole number, one bit per name
-    shifted = (flag.astype(np.int64) << bit for bit, flag in enumerate(rows.values()))
-    code = sum(shifted, start=np.int64(0))
+    code = np.zeros(len(next(iter(rows.values()))), dtype=np.int64)
+    for bit, flag in enumerate(rows.values()):
+        code[flag] |= 1 << bit
     # One text per combination that occurs
-    combinations, inverse = np.unique(code, return_inverse=True)
+    places, combinations = pd.factorize(code)
     texts = []
     for combination in combinations.tolist():
         names = [name for bit, name in enumerate(rows) if combination >> bit & 1]
         texts.append(" ".join(names))
-    chosen: NDArray[np.object_] = np.array(texts, dtype=object)[inverse]
+    chosen: NDArray[np.object_] = np.array(texts, dtype=object)[places]
     return chosen
+
+
+def metres_between(
+    longitude_1: ArrayLike, latitude_1: ArrayLike, longitude_2: ArrayLike, latitude_2: ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the way east and north from one position to another, m, across the date line too.
+
+    On a sphere taken as flat; positions in degrees.
+    """
+    turn = np.subtract(longitude_2, longitude_1)
+    east = (turn - 360.0 * np.rint(turn / 360.0)) * np.cos(np.deg2rad(latitude_1))
+    return METRES_PER_DEGREE * east, METRES_PER_DEGREE * np.subtract(latitude_2, latitude_1)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from per_obspy import read_pairs
-from per_obspy.inventory.earlier_rows import _HashTable
+from per_obspy.inventory.earlier_rows import FirstValues
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
 from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
@@ -491,11 +491,11 @@ def test_text_in_a_column_of_numbers_does_not_hide_a_unit(tmp_path):
 
 
 def test_memory_is_16_bytes_for_a_pair_and_a_building():
-    table, random = _HashTable(), np.random.default_rng(1)
+    table, random = FirstValues(), np.random.default_rng(1)
     for _ in range(50):
-        keys = random.integers(1, 1 << 63, 2000).astype(np.uint64)
-        table.first_values(keys, keys)
-    sizes = [sys.getsizeof(run.base if run.base is not None else run) for run in table._keys]
+        keys = np.sort(random.integers(1, 1 << 63, 2000).astype(np.uint64))
+        table.add(keys, keys)
+    sizes = [sys.getsizeof(one.base if one.base is not None else one) for one, _ in table._runs]
     # runs of 8 bytes per key, and no more than a few of them
     assert sum(sizes) < 8.1 * 100_000 + 1000 * len(sizes)
     assert len(sizes) < 20

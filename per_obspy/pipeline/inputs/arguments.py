@@ -207,9 +207,7 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
     """Return the sections of a configuration that name the records."""
     kind = kind_of(records)
     if kind is Kind.EVENT_ID:
-        from per_obspy.pipeline.inputs.event_section import event_section
-
-        return {"records": {"fdsn": event_section(records, output.absolute() / "fetched")}}
+        return {"records": {"fdsn": _fdsn_content(records, output.absolute() / "fetched")}}
     # Motion that is simulated or mapped
     path = Path(records).absolute()
     if kind is Kind.SCENARIO:
@@ -227,6 +225,21 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
         files = [file for file, one in files_in(path).items() if one is beside]
         found |= {key: str(files[0])} if len(files) == 1 else {}
     return {"records": found}
+
+
+def _fdsn_content(identifier: str, cache: Path) -> dict[str, Any]:
+    """Return the section ``[records.fdsn]`` for the identifier of an earthquake."""
+    from per_obspy.pipeline.fetch import CHANNELS
+    from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
+
+    provider, event = event_of(identifier)
+    return {
+        "event_id": event,
+        "event_provider": provider,
+        "providers": list(RECORDS_OF.get(provider, OTHERS)),
+        "channels": list(CHANNELS),
+        "cache": str(cache),
+    }
 
 
 def _pairs_content(pairs: str) -> dict[str, Any]:

@@ -104,7 +104,11 @@ def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[
     lines += [("simulated", "the ground motion is SIMULATED.")] if record.get("simulated") else []
     # Screened earthquake, and rejections
     groups = [one for one in record.get("earthquakes") or [] if one.get("screened")]
-    lines += [("earthquake", _earthquake(one, counts)) for one in groups]
+    for one in groups:
+        # Of the event where there are no groups
+        time = one.get("start") or (one.get("event") or {}).get("time", "")
+        stations = one.get("stations", counts.get("stations", 0))
+        lines.append(("earthquake", f"{time}, {stations} stations"))
     # Of footprints before the run, of everything else in it
     drawn = record.get("drawn") or {}
     if drawn.get("rejected"):
@@ -112,10 +116,11 @@ def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[
     return [*lines, *([("rejected", _rejected(counts))] if counts else [])]
 
 
-def _earthquake(group: dict[str, Any], counts: dict[str, int]) -> str:
-    """Return the time of an earthquake, of its event where there are no groups, and stations."""
-    time = group.get("start") or (group.get("event") or {}).get("time", "")
-    return f"{time}, {group.get('stations', counts.get('stations', 0))} stations"
+def _rejected(counts: dict[str, int]) -> str:
+    """Return the number of rejections of each kind as text."""
+    kinds = {name: count for name, count in counts.items() if name.startswith("rejected_")}
+    parts = [f"{count} {name.removeprefix('rejected_')}" for name, count in kinds.items() if count]
+    return f"{', '.join(parts)}: rejected.csv" if parts else "nothing"
 
 
 def _dotted(content: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -138,13 +143,6 @@ def _shown(configuration: Path, value: object) -> str:
 def _presence(path: Path) -> str:
     """Return a path and whether it exists."""
     return f"{path}{'' if path.exists() else ' (not there yet)'}"
-
-
-def _rejected(counts: dict[str, int]) -> str:
-    """Return the number of rejections of each kind as text."""
-    kinds = {name: count for name, count in counts.items() if name.startswith("rejected_")}
-    parts = [f"{count} {name.removeprefix('rejected_')}" for name, count in kinds.items() if count]
-    return f"{', '.join(parts)}: rejected.csv" if parts else "nothing"
 
 
 def _stations(path: Path) -> dict[str, Places]:

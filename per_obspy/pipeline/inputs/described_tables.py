@@ -1,8 +1,9 @@
 """Facts of pair tables, footprints and risk tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -36,58 +37,45 @@ def pair_table_facts(path: Path) -> Facts:
     inventory = PairInventory([path])
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
-    # Ranges, then derived, unknown and suspicious columns
-    derived = derived_counts(table) if len(table) else {}
-    unused = unused_columns(table)
-    odd = [("suspicious", sentence) for sentence in inventory.suspicions.sentences()]
-    lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(derived, unused), *odd]
-    lines += _rejected_lines(rejected, "line", "row")
-    # The same for machines
-    counted = {"rows": inventory.count, "usable": len(table)}
-    values = {**counted, "derived": derived, "unknown": unused, "rejected": rejected}
-    title = f"{_rows(inventory.count)}, {len(table)} usable, {len(rejected)} rejected"
+    derived, unused = derived_counts(table) if len(table) else {}, unused_columns(table)
+    lines = _pair_lines(table, derived, unused)
+    lines += [("suspicious", sentence) for sentence in inventory.suspicions.sentences()]
+    lines += _rejected_lines([(f"line {one['row']}", one["reasons"]) for one in rejected])
+    values = {
+        "rows": inventory.count, "usable": len(table), "derived": derived,
+        "unknown": unused, "rejected": rejected,
+    }  # fmt: skip
+    # Only the first rows of a large table are read
+    first = f"the first {MOST_ROWS} of " if inventory.count > MOST_ROWS else ""
+    title = f"{first}{inventory.count} rows, {len(table)} usable, {len(rejected)} rejected"
     return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, not table.empty)
 
 
-def _gap_lines(gaps: pd.Series) -> list[tuple[str, str]]:
-    """Return the range of the gaps, and how many pairs touch or have an unknown one."""
-    touching, unknown = int(gaps.eq(0.0).sum()), int(gaps.isna().sum())
-    return [("gap", f"{span(gaps, 'm')}; {touching} pairs touch, {unknown} unknown")]
-
-
-def _rows(count: int) -> str:
-    """Return the number of rows read, and of all rows if only the first are read."""
-    return f"the first {MOST_ROWS} of {count} rows" if count > MOST_ROWS else f"{count} rows"
-
-
-def _rejected_lines(
-    rejected: Sequence[dict[str, Any]], word: str, key: str
+def _pair_lines(
+    table: pd.DataFrame, derived: dict[str, int], unused: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return the first rejections with their reasons."""
-    first = [(f"{word} {one[key]}".strip(), "; ".join(one["reasons"])) for one in rejected[:FIRST]]
-    return [("rejected", f"{name}: {reasons}") for name, reasons in first]
-
-
-def _range_lines(table: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the ranges of the quantities of the buildings that are given."""
-    lines = []
-    # Both buildings together
+    """Return ranges of gaps and of both buildings together, derived and unknown columns."""
+    # Pairs that touch count apart
+    gaps = table["gap"]
+    pairs = f"{gaps.eq(0.0).sum()} pairs touch, {gaps.isna().sum()} unknown"
+    lines = [("gap", f"{span(gaps, 'm')}; {pairs}")]
     for name in _RANGES:
         numbers = np.concatenate([numbers_in(table, f"{name}_{i}") for i in (1, 2)])
-        unit = COLUMNS[f"{name}_1"].unit.replace("1", "")
         if not np.isnan(numbers).all():
-            lines.append((name, span(numbers.tolist(), unit)))
-    return lines
-
-
-def _odd_lines(derived: Mapping[str, int], unused: Sequence[str]) -> list[tuple[str, str]]:
-    """Return lines on derived and unknown columns of a pair table."""
-    lines = []
+            lines.append((name, span(numbers, COLUMNS[f"{name}_1"].unit.replace("1", ""))))
+    # Derived columns, and those that the schema does not know
     if derived:
         lines.append(("derived", some([f"{name} ({rows})" for name, rows in derived.items()], 8)))
     if unused:
         lines.append(("unknown", f"{some(unused)}: carried along unchanged"))
     return lines
+
+
+def _rejected_lines(rejected: Iterable[tuple[str, Sequence[str]]]) -> list[tuple[str, str]]:
+    """Return the first rejections with their reasons."""
+    return [
+        ("rejected", f"{name}: {'; '.join(reasons)}") for name, reasons in islice(rejected, FIRST)
+    ]
 
 
 def footprint_facts(path: Path) -> Facts:
@@ -102,7 +90,7 @@ def footprint_facts(path: Path) -> Facts:
     counted = [f"{name} ({count})" for name, count in given.items() if count]
     lines = [("columns", some(counted, 12))]
     rejected = [one._asdict() for one in layer.rejected]
-    lines += _rejected_lines(rejected, "", "name")
+    lines += _rejected_lines((one.name, one.reasons) for one in layer.rejected)
     east, north = _outline_centres(layer.outlines)
     values = {"outlines": len(east), "columns": given, "rejected": rejected}
     title = f"{len(east)} outlines, {len(rejected)} rejected"
@@ -145,19 +133,14 @@ def ranked_table_facts(files: Sequence[Path]) -> Facts:
 
 def _risk_facts(table: pd.DataFrame) -> Facts:
     """Return the facts of the worst rows of a risk table."""
-    # States, and the first rows, which are the worst
+    # States, unknown ones only where there are such pairs, and the first rows, which are the worst
     states = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
+    shown = [f"{n} {state}" for state, n in states.items() if n or state in STATES]
     worst = some([str(name) for name in table["pair_id"]], 5)
-    lines = [("pounding", _state_text(states)), ("worst pairs", worst)]
+    lines = [("pounding", ", ".join(shown)), ("worst pairs", worst)]
     title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
     values = {"pairs": len(table), **states}
     return Facts(Kind.RISK, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
-
-
-def _state_text(counts: Mapping[str, int]) -> str:
-    """Return the numbers of pairs by state, of an unknown one only where there are such pairs."""
-    shown = [one for one in counts.items() if one[1] or one[0] in STATES]
-    return ", ".join(f"{count} {state}" for state, count in shown)
 
 
 def _centres(table: pd.DataFrame) -> Places:

@@ -1,8 +1,4 @@
-"""
-Interpretation of ``per-obspy run A B``, and messages where an input is missing.
-
-Covers ``per_obspy.pipeline.inputs.event_section``.
-"""
+"""Interpretation of ``per-obspy run A B``, and messages where an input is missing."""
 
 import pytest
 
