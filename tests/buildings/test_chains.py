@@ -1,8 +1,4 @@
-"""
-Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row.
-
-Tested here as well: per_obspy.inventory.building_rows.walks.
-"""
+"""Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row."""
 
 import time
 from itertools import pairwise
@@ -10,29 +6,33 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from per_obspy.inventory.building_rows.chains import ROW_FLAGS, chains_of
-from per_obspy.inventory.building_rows.contacts import contacts_of
-from per_obspy.inventory.building_rows.given import given_values
-from per_obspy.inventory.building_rows.joints import joints_of
+from per_obspy.buildings.chains import ROW_FLAGS, chains_of
+from per_obspy.buildings.contacts import contacts_of
+from per_obspy.buildings.joints import joints_of
 
-from .street import street, terrace
+from .street import street, table_of, terrace
 
 
 def rows_of(table, angle=30.0, longest=30):
     """Return the buildings of each row along its axis, its flags, and all that was found."""
-    contacts = contacts_of(table, angle)
-    joints = joints_of(contacts, given_values(table), angle)
-    chains = chains_of(contacts, joints, angle, longest)
-    rows, flags = [], []
+    pairs = table_of(table)
+    contacts = contacts_of(pairs, angle)
+    chains = chains_of(contacts, joints_of(contacts, pairs, angle), angle, longest)
+    names = np.stack([side.to_numpy() for side in contacts.names], axis=1)
+    found = []
     for number, (begin, end) in enumerate(pairwise(chains.first.tolist())):
+        pair, turned = chains.pair[begin:end], chains.turned[begin:end]
         sides = [
-            contacts.names[contacts.buildings[pair][:: -1 if turned else 1]].tolist()
-            for pair, turned in zip(chains.pair[begin:end], chains.turned[begin:end], strict=True)
+            names[k][:: -1 if back else 1].tolist() for k, back in zip(pair, turned, strict=True)
         ]
         # each contact begins with the building with which the one before ends
         assert all(one[1] == two[0] for one, two in pairwise(sides))
-        rows.append([sides[0][0], *(side[1] for side in sides)])
-        flags.append({name for name in ROW_FLAGS if chains.flags[name][number]})
+        flags = {name for name in ROW_FLAGS if chains.flags[name][number]}
+        first = contacts.order[pair].min()
+        found.append((first, [sides[0][0], *(side[1] for side in sides)], flags))
+    # rows are in any order: by the first of the names of their pairs
+    found.sort(key=lambda row: row[0])
+    rows, flags = [row for _, row, _ in found], [raised for _, _, raised in found]
     kept = np.flatnonzero(~contacts.repeated)
     assert sorted(chains.pair.tolist()) == kept.tolist()
     return rows, flags, chains
