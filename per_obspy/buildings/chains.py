@@ -296,6 +296,6 @@ def _flags_of_pairs(contacts: Contacts, joints: Joints) -> dict[str, BoolArray]:
         "contradictory": contradictory,
         "no_building_id": (contacts.codes.min(axis=1) < 0) & ~contacts.ambiguous,
         "ambiguous_id": contacts.ambiguous | crowded,
-        "unknown_gap": ~contacts.gap_given,
+        "unknown_gap": ~np.isfinite(contacts.gap) | contacts.derived.has("gap"),
         "unknown_azimuth": np.isnan(contacts.azimuth),
     }

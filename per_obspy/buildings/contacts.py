@@ -58,8 +58,8 @@ class Contacts(NamedTuple):
         From building 1 to 2, degrees; NaN if unknown.
     gap, facing_length : (n_pairs,) ndarray
         m; NaN where the gap is unknown, 0 where the facing length is.
-    gap_given : (n_pairs,) ndarray of bool
-        Whether the table gives the gap.
+    derived : Derived
+        Columns that the table does not give.
     pair_id : (n_pairs,) ChunkedArray of str
         Identifiers of the pairs.
     order : (n_pairs,) ndarray of int
@@ -78,7 +78,7 @@ class Contacts(NamedTuple):
     azimuth: FloatArray
     gap: FloatArray
     facing_length: FloatArray
-    gap_given: BoolArray
+    derived: "Derived"
     pair_id: pa.ChunkedArray
     order: IntArray
     repeated: BoolArray
@@ -105,7 +105,7 @@ def contacts_of(pairs: pa.Table, angle: float) -> Contacts:
     """
     # Buildings and their contacts
     buildings, own, ambiguous, rejected = _number(pairs)
-    gap = numbers_in(pairs, "gap")
+    gap, derived = numbers_in(pairs, "gap"), Derived(pairs["derived"])
     contacts = Contacts(
         buildings=buildings,
         codes=np.where(own, -1, _codes(pairs)),
@@ -113,7 +113,7 @@ def contacts_of(pairs: pa.Table, angle: float) -> Contacts:
         azimuth=numbers_in(pairs, "azimuth"),
         gap=gap,
         facing_length=np.nan_to_num(numbers_in(pairs, "facing_length")),
-        gap_given=np.isfinite(gap) & ~is_derived(pairs["derived"], "gap"),
+        derived=derived,
         pair_id=pairs["pair_id"],
         order=pc.rank(pairs["pair_id"], tiebreaker="dense").to_numpy().astype(np.int64) - 1,
         repeated=np.zeros(gap.size, dtype=bool),
@@ -166,21 +166,37 @@ def numbers_in(pairs: pa.Table, name: str) -> FloatArray:
     return np.asarray(pairs[name].to_numpy(), dtype=np.float64)
 
 
-def is_derived(derived: ArrayLike, column: str) -> BoolArray:
-    """Return in which rows a column is among those that were derived, by their list in a text."""
-    # Many rows share few texts
-    codes, texts = pd.factorize(np.asarray(derived, dtype=object), use_na_sentinel=False)
-    return np.array([column in str(text).split() for text in texts], dtype=bool)[codes]
+class Derived:
+    """
+    Columns of each row of a table that were derived or assumed.
+
+    Parameters
+    ----------
+    texts : (n_rows,) array_like of str
+        Names of columns, separated by spaces.
+    """
+
+    def __init__(self, texts: ArrayLike) -> None:
+        # Many rows share few texts
+        objects = np.asarray(texts, dtype=object)
+        self._codes, distinct = pd.factorize(objects, use_na_sentinel=False)
+        self._columns = [str(text).split() for text in distinct]
+
+    def has(self, column: str) -> BoolArray:
+        """Return in which rows a column was derived."""
+        return np.array([column in columns for columns in self._columns], dtype=bool)[self._codes]
 
 
-def given_values(pairs: pa.Table, name: str) -> FloatArray:
+def given_values(pairs: pa.Table, derived: Derived, name: str) -> FloatArray:
     """
     Return a property of buildings 1 and 2 as far as the table gives it.
 
     Parameters
     ----------
     pairs : Table
-        Completed pairs, with ``derived``.
+        Completed pairs.
+    derived : Derived
+        Their columns that are not given.
     name : str
         One of ``PROPERTIES``.
 
@@ -192,7 +208,7 @@ def given_values(pairs: pa.Table, name: str) -> FloatArray:
     sides = []
     for i in (1, 2):
         values = numbers_in(pairs, f"{name}_{i}")
-        is_given = np.isfinite(values) & ~is_derived(pairs["derived"], f"{name}_{i}")
+        is_given = np.isfinite(values) & ~derived.has(f"{name}_{i}")
         # Without a yield displacement a hardening of 0 is assumed
         if name == "hardening":
             is_given &= np.isfinite(numbers_in(pairs, f"yield_displacement_{i}"))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from per_obspy.buildings.contacts import BoolArray, IntArray, is_derived
+from per_obspy.buildings.contacts import BoolArray, Derived, IntArray
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.history.row_maxima import BuildingRows, RowMaxima, row_and_pair_maxima
 from per_obspy.screening.values import Columns, Table, both, values
@@ -174,10 +174,13 @@ def _oscillators(contacts: Table, layout: "_Layout") -> tuple[dict[str, FloatArr
     pairs = {name: both(contacts, name) for name in PROPERTIES}
     pairs["mass"] = mass_1 * np.square(share_1), mass_2 * np.square(share_2)
     # Two descriptions of each building become one
-    oscillators, differs = {}, list[BoolArray]()
-    for name, pair in pairs.items():
-        descriptions = layout.beside(pair, np.nan)
-        oscillators[name] = _reconcile(descriptions, layout.known(contacts, name, pair))
+    oscillators, differs, derived = {}, list[BoolArray](), Derived(contacts["derived"])
+    for name, (one, two) in pairs.items():
+        descriptions = layout.beside((one, two), np.nan)
+        # 1 where a value is known, else 0
+        known_1 = 1.0 * (np.isfinite(one) & ~derived.has(f"{name}_1"))
+        known_2 = 1.0 * (np.isfinite(two) & ~derived.has(f"{name}_2"))
+        oscillators[name] = _reconcile(descriptions, layout.beside((known_1, known_2), 0.0))
         differs.append(_differ(descriptions))
     return oscillators, np.any(differs, axis=0)
 
@@ -199,14 +202,6 @@ class _Layout(NamedTuple):
         on_left, on_right = (np.where(self.turned, *sides) for sides in (pair[::-1], pair))
         parts = [(self.left, on_left), (self.left + 1, on_right)]
         return np.stack([self.spread(*part, other) for part in parts])
-
-    def known(self, contacts: Table, name: str, pair: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return 1 where the contacts beside a building give a property that is not derived."""
-        is_known = [
-            np.isfinite(side) & ~is_derived(contacts["derived"], f"{name}_{i}")
-            for i, side in enumerate(pair, 1)
-        ]
-        return self.beside((is_known[0].astype(np.float64), is_known[1].astype(np.float64)), 0.0)
 
 
 def _reconcile(descriptions: FloatArray, is_known: FloatArray) -> FloatArray:

@@ -136,7 +136,7 @@ def _agreement(
     """Return which candidates agree about their building, and the contradictions."""
     agrees, rejected = np.ones(candidates.first.size, dtype=bool), list[OrderedRejection]()
     for place, name in enumerate(PROPERTIES):
-        values = given_values(pairs, name).ravel()
+        values = given_values(pairs, contacts.derived, name).ravel()
         first, second = values[candidates.first], values[candidates.second]
         # NaN means unknown and contradicts no value
         differs = np.abs(first - second) > AGREEMENT * np.maximum(np.abs(first), np.abs(second))

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import duckdb
 import numpy as np
@@ -28,7 +28,7 @@ from per_obspy.buildings.streams import (
     tables_of,
     whole_groups,
 )
-from per_obspy.config import Totals
+from per_obspy.config import Run, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
 from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
@@ -107,27 +107,8 @@ def _write_table(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
             writer.write_table(table)
 
 
-class BuildingWays(NamedTuple):
-    """
-    Settings of classes, counts and places of buildings.
-
-    Attributes
-    ----------
-    classes : mapping of str to float
-        Name and smallest severity of each risk class, m/s.
-    totals : Totals
-        Areas.
-    angle : float
-        Rows whose axes differ by more make their building a corner, degrees.
-    """
-
-    classes: Mapping[str, float]
-    totals: Totals
-    angle: float
-
-
 def write_buildings(
-    folder: Path, contacts: Path, ways: BuildingWays, facts: Mapping[str, str], csv_rows: int
+    folder: Path, contacts: Path, settings: Run, facts: Mapping[str, str]
 ) -> list[Path]:
     """
     Write ``buildings.parquet``, ``buildings.csv`` and ``buildings.columns.csv``.
@@ -139,12 +120,11 @@ def write_buildings(
     contacts : Path
         Parquet file of the columns ``OF_PAIRS`` and those of the areas, as far as they are known,
         in the order of ``rows.parquet``.
-    ways : BuildingWays
-        Classes, areas and corners.
+    settings : Run
+        Classes, areas, the angle between rows of a corner, and the number of buildings in
+        ``buildings.csv``, the worst ones.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
-    csv_rows : int
-        Number of buildings in ``buildings.csv``, the worst ones.
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
@@ -152,14 +132,14 @@ def write_buildings(
         # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
-            for sides in _sides(database, folder / "rows.parquet", contacts, ways.totals):
-                buildings = building_table(sides, ways.classes, ways.angle)
+            for sides in _sides(database, folder / "rows.parquet", contacts, settings.totals):
+                buildings = building_table(sides, settings.screening.classes, settings.rows.angle)
                 writer.write_table(table_of(buildings, UNRANKED))
         schema = _stated_schema(BUILDINGS, facts)
         with stored_rows(unranked) as stored:
             database.register("buildings", stored)
             _write_table(_ranked(database, schema), schema, table)
-    write_worst(table, csv_rows, text)
+    write_worst(table, settings.csv_rows, text)
     write_meanings(BUILDINGS, {**FLAGS, **BUILDING_FLAGS}, columns)
     return files
 

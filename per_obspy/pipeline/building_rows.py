@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pyarrow.parquet as pq
 
 from per_obspy.buildings.search import IDENTIFIERS, AllRows, chunks_of, find_rows
-from per_obspy.buildings.tables import BuildingWays, write_buildings, write_rows
+from per_obspy.buildings.tables import write_buildings, write_rows
 from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file, temporary_folder
@@ -87,8 +87,7 @@ def building_rows(
         # Parts of an earlier table would be taken for parts of this one
         _remove_others(folder / "rows", parts)
         outputs = write_rows([part.path for part in parts], folder, facts)
-        ways = BuildingWays(settings.screening.classes, settings.totals, settings.rows.angle)
-        outputs += write_buildings(folder, found.file, ways, facts, settings.csv_rows)
+        outputs += write_buildings(folder, found.file, settings, facts)
     rejected = (*found.rejected, *rows_rejections(parts))
     failed = any(part.failed for part in parts)
     return BuildingRowsDone(outputs, _counts(found, folder, parts), rejected, failed, found.served)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from per_obspy.buildings.contacts import PROPERTIES, contacts_of, given_values, is_derived
+from per_obspy.buildings.contacts import PROPERTIES, Derived, contacts_of, given_values
 
 from .street import street, table_of
 
@@ -99,7 +99,7 @@ def test_a_known_gap_goes_before_an_unknown_one():
 
 def test_whole_names_count():
     derived = pd.Series(["period_1 mass_2", "period_11", ""])
-    assert is_derived(derived, "period_1").tolist() == [True, False, False]
+    assert Derived(derived).has("period_1").tolist() == [True, False, False]
 
 
 def test_derived_infinite_and_absent_values_are_not_given():
@@ -112,7 +112,9 @@ def test_derived_infinite_and_absent_values_are_not_given():
             "hardening_1": [0.0, 0.02],
         }
     )
-    given = {name: given_values(table_of(table), name) for name in PROPERTIES}
+    given = {
+        name: given_values(table_of(table), Derived(table["derived"]), name) for name in PROPERTIES
+    }
     np.testing.assert_array_equal(given["period"], [[0.5, 0.7], [np.nan, 0.8]])
     np.testing.assert_array_equal(given["yield_displacement"][:, 0], [np.nan, 0.1])
     # the hardening of a building that does not yield means nothing
