@@ -8,7 +8,7 @@ and as a pair of the same two buildings alone under the same motion, so that the
 effect of the other neighbours.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,8 +178,8 @@ def _oscillators(contacts: Table, layout: "_Layout") -> tuple[dict[str, FloatArr
     for name, (one, two) in pairs.items():
         descriptions = layout.beside((one, two), np.nan)
         # 1 where a value is known, else 0
-        known_1 = 1.0 * (np.isfinite(one) & ~derived.has(f"{name}_1"))
-        known_2 = 1.0 * (np.isfinite(two) & ~derived.has(f"{name}_2"))
+        known_1 = np.isfinite(one) & ~derived.has(f"{name}_1")
+        known_2 = np.isfinite(two) & ~derived.has(f"{name}_2")
         oscillators[name] = _reconcile(descriptions, layout.beside((known_1, known_2), 0.0))
         differs.append(_differ(descriptions))
     return oscillators, np.any(differs, axis=0)
@@ -191,13 +191,13 @@ class _Layout(NamedTuple):
     left: IntArray
     turned: BoolArray
 
-    def spread(self, buildings: IntArray, column: FloatArray, other: float) -> FloatArray:
+    def spread(self, buildings: IntArray, column: NDArray[Any], other: float) -> FloatArray:
         """Return one value per building: given values for some, another value elsewhere."""
         whole = np.full(self.left[-1] + 2, other)
         whole[buildings] = column
         return whole
 
-    def beside(self, pair: tuple[FloatArray, FloatArray], other: float) -> FloatArray:
+    def beside(self, pair: tuple[NDArray[Any], NDArray[Any]], other: float) -> FloatArray:
         """Return values of buildings 1 and 2 as those from the right and from the left contact."""
         on_left, on_right = (np.where(self.turned, *sides) for sides in (pair[::-1], pair))
         parts = [(self.left, on_left), (self.left + 1, on_right)]

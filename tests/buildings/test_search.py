@@ -115,6 +115,12 @@ def test_the_worst_axis_takes_the_place_of_an_unknown_one():
     assert found_in(pairs, "A", 200.0)[0]["azimuth"].tolist() == [200.0, 10.0, 10.0]
 
 
+def test_stations_of_repeated_contacts_take_no_part():
+    # Mutation: names of stations of all pairs, numbers among those of the contacts
+    pairs = street(("a", "b", 10.0, 0.1), ("a", "b", 10.0, 0.2), ("b", "c", 10.0, 0.1))
+    assert set(found_in(pairs, ["B", "A", "B"])[0]["station"]) == {"B"}
+
+
 def test_buildings_are_counted_by_the_stations_of_their_pairs():
     pairs = street(("a", "b", 10.0, 0.1), ("b", "c", 10.0, 0.1), ("c", "d", 10.0, 0.1))
     assert found_in(pairs, ["A", "A", ""])[1].served == {"A": 3}
