@@ -15,19 +15,15 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from per_obspy.buildings.histories import no_outcomes, row_outcomes
+from per_obspy.buildings.tables import write_rows_part
 from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
 from per_obspy.jobs.ground_files import StationFile, read_station_once
 from per_obspy.jobs.parallel import Work, new_and_resumed
 from per_obspy.resume import earlier_status, read_status, write_status
-from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
-from per_obspy.screening.building_rows.members import IntArray
 from per_obspy.screening.values import Columns, chosen, components
 from per_obspy.spectra.station import lacks_azimuths
-from per_obspy.tables.building_rows import write_rows_part
-
-#: Contacts of a chunk, about: a worker needs 1 kB for each.
-CHUNK = 10_000
 
 
 class RowsJob(NamedTuple):
@@ -40,7 +36,7 @@ class RowsJob(NamedTuple):
         Place of the chunk.
     contacts : Table
         Contacts of whole rows, one after the other, with the columns of their interfaces that are
-        known, ``row`` (rising) and those of ``members.NEEDED``.
+        known, and those of ``histories.NEEDED``.
     station : StationFile or None
         Whose record they are followed under; None: no history is computed.
     part : Path
@@ -126,18 +122,18 @@ def do_rows(job: RowsJob) -> RowsPart:
     remove_file(job.part)
     contacts = _columns(job.contacts)
     if job.station is None:
-        return _recorded(job, contacts, no_outcomes(job.contacts.num_rows), ())
+        return _record(job, contacts, no_outcomes(job.contacts.num_rows), ())
     dataset = read_station_once(job.station.shard, job.station.hash)
     if lacks_azimuths(dataset):
         reason = f"the azimuths of the horizontals of {dataset['station'].item()} are unknown"
-        return _recorded(job, contacts, *_all_rejected(job, reason))
+        return _reject_all(job, reason)
     # Along a single horizontal whatever the axis: it counts as north
     one_horizontal = dataset.sizes["horizontal"] == 1
     if one_horizontal:
-        contacts["flags"] = _flagged(contacts["flags"], "one_horizontal", None)
+        contacts["flags"] = _flagged(contacts["flags"], "one_horizontal")
     axis = np.zeros(job.contacts.num_rows) if one_horizontal else contacts["azimuth"]
     outcomes, rejected = _known_outcomes(components(dataset), contacts | {"axis": axis})
-    return _recorded(job, contacts, outcomes, rejected)
+    return _record(job, contacts, outcomes, rejected)
 
 
 def _columns(table: pa.Table) -> Columns:
@@ -151,60 +147,55 @@ def _known_outcomes(
 ) -> tuple[Columns, tuple[Rejection, ...]]:
     """Compute the outcomes of all rows but those of unknown gap, which are rows of two."""
     known = np.flatnonzero(np.isfinite(contacts["gap"]))
-    found = no_outcomes(contacts["row"].size)
+    outcomes = no_outcomes(contacts["gap"].size)
     if not known.size:
-        return found, ()
-    # Rows of unknown gap stay empty
-    outcomes, rejected = _outcomes(motion, chosen(contacts, known))
-    for name, column in outcomes.items():
-        found[name][known] = column
-    return found, rejected
+        return outcomes, ()
+    computed, rejected = _outcomes(motion, chosen(contacts, known))
+    for name, column in computed.items():
+        outcomes[name][known] = column
+    return outcomes, rejected
 
 
 def _outcomes(
     motion: tuple[np.ndarray, np.ndarray, float], contacts: Columns
 ) -> tuple[Columns, tuple[Rejection, ...]]:
     """Compute the outcomes of all rows but those that fail, which are found by halving."""
-    first = _first(contacts["row"])
+    count = contacts["interface"].size
+    first = np.append(np.flatnonzero(contacts["interface"] == 1), count)
     try:
         return row_outcomes(motion, contacts, first, contacts["axis"][first[:-1]]), ()
     except (ValueError, ArithmeticError, RuntimeError) as error:
         if first.size == 2:
             rejection = Rejection("row", contacts["row_id"][0], "", None, (str(error),))
-            return no_outcomes(contacts["row"].size), (rejection,)
+            return no_outcomes(count), (rejection,)
 
     # A row among several fails: each half is computed alone
     middle = first[first.size // 2]
-    before = {name: column[:middle] for name, column in contacts.items()}
-    behind = {name: column[middle:] for name, column in contacts.items()}
-    (one, rejected), (other, more) = _outcomes(motion, before), _outcomes(motion, behind)
+    (one, rejected), (other, more) = (
+        _outcomes(motion, chosen(contacts, rows))
+        for rows in (np.arange(middle), np.arange(middle, count))
+    )
     # Both halves in their order
-    joined = {name: np.concatenate([one[name], other[name]]) for name in one}
-    return joined, (*rejected, *more)
+    return {name: np.append(one[name], other[name]) for name in one}, (*rejected, *more)
 
 
-def _first(row: IntArray) -> IntArray:
-    """Return the place of the first contact of each row, and the end."""
-    starts = np.flatnonzero(np.diff(row, prepend=row[:1] - 1))
-    return np.append(starts, row.size)
+def _flagged(flags: np.ndarray, name: str) -> np.ndarray:
+    """Add a flag to texts of flags."""
+    return np.array([f"{text} {name}".strip() for text in flags.tolist()], dtype=object)
 
 
-def _flagged(flags: np.ndarray, name: str, where: np.ndarray | None) -> np.ndarray:
-    """Add a flag to texts of flags, in all or some rows."""
-    longer = np.array([f"{text} {name}".strip() for text in flags.tolist()], dtype=object)
-    return longer if where is None else np.where(where, longer, flags)
-
-
-def _recorded(
+def _record(
     job: RowsJob, contacts: Columns, outcomes: Columns, rejected: Sequence[Rejection]
 ) -> RowsPart:
     """Write a part, its status after it, and return the part."""
-    row = contacts["row"]
+    names, flags = contacts["row_id"], contacts["flags"]
     # What holds for one contact of a row holds for all of it
-    reconciled = np.isin(row, row[outcomes["reconciled"]])
-    flags = _flagged(contacts["flags"], "values_reconciled", reconciled)
-    failed = np.isin(contacts["row_id"], [rejection.name for rejection in rejected])
-    flags = _flagged(flags, "no_history", failed)
+    raised = {
+        "values_reconciled": np.isin(names, names[outcomes["reconciled"]]),
+        "no_history": np.isin(names, [rejection.name for rejection in rejected]),
+    }
+    for name, rows in raised.items():
+        flags = np.where(rows, _flagged(flags, name), flags)
     write_rows_part({**contacts, **outcomes, "flags": flags}, job.part)
     outputs = {job.part.name: file_hash(job.part)}
     write_status(_status_file(job), job.key, outputs, {"rejected": list(rejected)})
@@ -240,13 +231,11 @@ def _name(job: RowsJob) -> str:
 
 def _failed(job: RowsJob, reason: str) -> RowsPart:
     """Return a part without histories after a failure; the next run repeats it."""
-    undone = job._replace(key="")
-    part = _recorded(undone, _columns(job.contacts), *_all_rejected(job, reason))
-    return part._replace(failed=True)
+    return _reject_all(job._replace(key=""), reason)._replace(failed=True)
 
 
-def _all_rejected(job: RowsJob, reason: str) -> tuple[Columns, tuple[Rejection, ...]]:
-    """Return the outcomes and rejections of a chunk of which no row has a history."""
+def _reject_all(job: RowsJob, reason: str) -> RowsPart:
+    """Write a part of which no row has a history, for the same reason."""
     names = dict.fromkeys(job.contacts["row_id"].to_pylist())
-    rejected = tuple(Rejection("row", str(name), "", None, (reason,)) for name in names)
-    return no_outcomes(job.contacts.num_rows), rejected
+    rejected = [Rejection("row", str(name), "", None, (reason,)) for name in names]
+    return _record(job, _columns(job.contacts), no_outcomes(job.contacts.num_rows), rejected)

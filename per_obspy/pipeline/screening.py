@@ -20,10 +20,10 @@ from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.losses import areas_left_out, search_of_tables
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.results.served_stations import Served
-from per_obspy.pipeline.rows.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE

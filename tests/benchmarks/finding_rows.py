@@ -19,9 +19,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from per_obspy.buildings.search import find_rows
 from per_obspy.config.pairs import Rows
-from per_obspy.pipeline.rows.all_rows import all_rows
-from per_obspy.pipeline.rows.pair_columns import pair_columns
+from per_obspy.tables.ranked_table import ranked_table
 
 NAMES = ("pair_id", "building_id_1", "building_id_2")
 
@@ -45,8 +45,8 @@ def write_copies(risk: Path, copies: int, path: Path) -> None:
 def measured(path: Path) -> None:
     """Find the rows of a table, and print pairs, rows, processor time and memory."""
     before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
-    with tempfile.TemporaryDirectory() as room, pair_columns([path]) as pairs:
-        found = all_rows(pairs, Rows(), None, Path(room))
+    with tempfile.TemporaryDirectory() as room, ranked_table([path]) as pairs:
+        found = find_rows(pairs, Rows(), None, Path(room))
         disk = found.file.stat().st_size / 1e6
     after, used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time() - start
     print(

@@ -150,7 +150,7 @@ def test_fewer_pairs_are_one_file_again(copied):
 def test_results_do_not_depend_on_workers(copied, monkeypatch):
     before = results(copied)
     shutil.rmtree(copied / "out" / "rows")
-    for name in (CHUNK, "per_obspy.pipeline.rows.all_rows.CHUNK"):
+    for name in (CHUNK, "per_obspy.buildings.search.CHUNK"):
         monkeypatch.setattr(name, 20)
     text = (copied / "run.toml").read_text()
     (copied / "run.toml").write_text(text.replace("workers = 1", "workers = 2"))

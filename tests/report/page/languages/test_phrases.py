@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import per_obspy
+from per_obspy.buildings.sides import ELSEWHERE, MEASURE, NOTHING, measures_sentence
 from per_obspy.report.page.languages.phrases import SPANISH_PHRASES, in_spanish
-from per_obspy.screening.building_rows.prevention import ELSEWHERE, MEASURE, NOTHING, _sentence
 
 ROOT = Path(per_obspy.__file__).parent
 
@@ -27,7 +27,9 @@ def test_every_phrase_is_written_by_a_module(sources):
     assert [phrase for phrase in SPANISH_PHRASES if phrase not in sources] == []
 
 
-@pytest.mark.parametrize("text", [NOTHING, ELSEWHERE, MEASURE, _sentence(0.1, 0.2, 0.3, "B7")])
+@pytest.mark.parametrize(
+    "text", [NOTHING, ELSEWHERE, MEASURE, measures_sentence(0.1, 0.2, 0.3, "B7")]
+)
 def test_prevention_of_a_building_is_wholly_spanish(text):
     english = re.compile(r"\b(the|of|to|in|or|up|more|less|gap|gaps|first|its|by|are|not|and)\b")
     assert english.search(text)
@@ -35,7 +37,7 @@ def test_prevention_of_a_building_is_wholly_spanish(text):
 
 
 def test_numbers_and_names_stay():
-    said = in_spanish(_sentence(0.123, 0.0, 1.0, "Torre or less"))
+    said = in_spanish(measures_sentence(0.123, 0.0, 1.0, "Torre or less"))
     assert "0.123 m" in said
     assert "Torre" in said
 

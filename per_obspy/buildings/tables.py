@@ -1,17 +1,16 @@
 """
-Table of the buildings, worst first, from the rows of buildings and the risk table.
+Tables of rows of buildings and of buildings, worst first.
 
 The sides of all buildings are ordered by a database of bounded memory, and reduced to buildings in
 pieces; the buildings are then ordered by their ranking.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import duckdb
 import numpy as np
@@ -19,17 +18,20 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from per_obspy.config import Totals
+from per_obspy.buildings.columns import BUILDING_FLAGS, BUILDINGS, FLAGS, ROWS
+from per_obspy.buildings.search import AREA
+from per_obspy.buildings.sides import OF_PAIRS, building_table, directions
+from per_obspy.buildings.streams import (
+    GROUP,
+    one_thread_database,
+    stored_rows,
+    tables_of,
+    whole_groups,
+)
+from per_obspy.config import Run, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.building_rows.buildings import building_table
-from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, BUILDINGS, FLAGS
-from per_obspy.screening.building_rows.sides import OF_PAIRS, directions
-from per_obspy.tables.parts import (
-    batches,
-    bounded_database,
-    text_columns,
-)
+from per_obspy.tables.parts import text_columns
 from per_obspy.tables.risk import write_worst
 from per_obspy.tables.table_files import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.totals import areas_of
@@ -37,19 +39,8 @@ from per_obspy.tables.totals import areas_of
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000
 
-#: Rows of a file that are read together.
-TOGETHER = 10_000
-
 #: Buildings that are written together.
-ROWS = 50_000
-
-#: Name of the column of areas in the file of contacts: that of the pair table may be any.
-AREA = "area_of_totals"
-
-#: Threads of the database: one needs a quarter less processor time than two.
-THREADS = 1
-
-_NUMBER = Column("building_number", "int64", "1", "")
+RANKED = 50_000
 
 #: Columns of the rows that a side of a building needs.
 _OF_ROWS = (
@@ -60,7 +51,7 @@ _OF_ROWS = (
 )  # fmt: skip
 
 #: Columns of a building before it has a rank.
-UNRANKED = (_NUMBER, *BUILDINGS[1:])
+UNRANKED = (Column("building_number", "int64", "1", ""), *BUILDINGS[1:])
 
 #: Order of the ranking; the last ones only break ties.
 _ORDER = (
@@ -71,43 +62,53 @@ _ORDER = (
 )
 
 
-class BuildingWays(NamedTuple):
-    """
-    Settings of classes, counts and places of buildings.
+def write_rows_part(interfaces: Mapping[str, Any], path: Path) -> None:
+    """Write some interfaces with the columns ``ROWS``."""
+    table = table_of(interfaces, ROWS)
+    with written_whole(path) as part:
+        texts = text_columns(table.schema)
+        pq.write_table(table, part, row_group_size=GROUP, use_dictionary=texts)
 
-    Attributes
+
+def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) -> list[Path]:
+    """
+    Write ``rows.parquet`` and ``rows.columns.csv``.
+
+    Parameters
     ----------
-    classes : mapping of str to float
-        Name and smallest severity of each risk class, m/s.
-    totals : Totals
-        Areas.
-    angle : float
-        Rows whose axes differ by more make their building a corner, degrees.
+    parts : sequence of Path
+        From :func:`write_rows_part`, in their order.
+    folder : Path
+        Folder of the files.
+    facts : mapping of str to str
+        Facts of the whole table that the Parquet file states.
     """
-
-    classes: Mapping[str, float]
-    totals: Totals
-    angle: float
-
-
-@contextmanager
-def one_thread_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Yield a database of one thread, which leaves what is too much to a folder inside."""
-    with bounded_database(folder) as database:
-        database.execute(f"SET threads = {THREADS}")
-        yield database
+    files = [folder / "rows.parquet", folder / "rows.columns.csv"]
+    tables = (pq.ParquetFile(part.absolute()).read(use_threads=False) for part in parts)
+    schema = _stated_schema(ROWS, facts)
+    _write_table(regrouped(tables, schema, GROUP), schema, files[0])
+    write_meanings(ROWS, FLAGS, files[1])
+    return files
 
 
-@contextmanager
-def stored_rows(file: Path) -> Iterator[pa.RecordBatchReader]:
-    """Yield the rows of a Parquet file once, for a database; a dataset would read far ahead."""
-    with pq.ParquetFile(file.absolute(), pre_buffer=False) as stored:
-        rows = stored.iter_batches(TOGETHER, use_threads=False)
-        yield pa.RecordBatchReader.from_batches(stored.schema_arrow, rows)
+def _stated_schema(columns: Sequence[Column], facts: Mapping[str, str]) -> pa.Schema:
+    """Return the schema of a table with the facts of the risk table."""
+    statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
+    return schema_of(columns, statement)
+
+
+def _write_table(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
+    """Write tables as one file, each as a group of rows."""
+    with (
+        written_whole(path) as part,
+        pq.ParquetWriter(part, schema, use_dictionary=text_columns(schema)) as writer,
+    ):
+        for table in tables:
+            writer.write_table(table)
 
 
 def write_buildings(
-    folder: Path, contacts: Path, ways: BuildingWays, facts: Mapping[str, str], csv_rows: int
+    folder: Path, contacts: Path, settings: Run, facts: Mapping[str, str]
 ) -> list[Path]:
     """
     Write ``buildings.parquet``, ``buildings.csv`` and ``buildings.columns.csv``.
@@ -119,12 +120,11 @@ def write_buildings(
     contacts : Path
         Parquet file of the columns ``OF_PAIRS`` and those of the areas, as far as they are known,
         in the order of ``rows.parquet``.
-    ways : BuildingWays
-        Classes, areas and corners.
+    settings : Run
+        Classes, areas, the angle between rows of a corner, and the number of buildings in
+        ``buildings.csv``, the worst ones.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
-    csv_rows : int
-        Number of buildings in ``buildings.csv``, the worst ones.
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
@@ -132,36 +132,30 @@ def write_buildings(
         # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
-            for piece in _pieces(database, folder / "rows.parquet", contacts, ways.totals):
-                found = building_table(piece, ways.classes, ways.angle)
-                writer.write_table(table_of(found, UNRANKED))
-        _write_ranked(database, unranked, table, facts)
-    write_worst(table, csv_rows, text)
+            for sides in _sides(database, folder / "rows.parquet", contacts, settings.totals):
+                buildings = building_table(sides, settings.screening.classes, settings.rows.angle)
+                writer.write_table(table_of(buildings, UNRANKED))
+        schema = _stated_schema(BUILDINGS, facts)
+        with stored_rows(unranked) as stored:
+            database.register("buildings", stored)
+            _write_table(_ranked(database, schema), schema, table)
+    write_worst(table, settings.csv_rows, text)
     write_meanings(BUILDINGS, {**FLAGS, **BUILDING_FLAGS}, columns)
     return files
 
 
-def _pieces(
+def _sides(
     database: duckdb.DuckDBPyConnection, rows: Path, contacts: Path, totals: Totals
 ) -> Iterator[pd.DataFrame]:
     """Yield the sides of buildings in pieces; all sides of a building are in one piece."""
-    # The first ones have the columns of all
     interfaces = _interfaces(rows, contacts, totals)
     first = next(interfaces)
+    # The first ones have the columns of all
     source = (batch for table in chain([first], interfaces) for batch in table.to_batches())
     database.register("interfaces", pa.RecordBatchReader.from_batches(first.schema, source))
-    waiting: list[pd.DataFrame] = []
-    for batch in batches(database, sides_query(first.column_names), SIDES):
-        waiting.append(batch.to_pandas())
-        found = pd.concat(waiting, ignore_index=True) if len(waiting) > 1 else waiting[0]
-        # The last building may go on in the next batch
-        number = found["building_number"].to_numpy()
-        whole = int(np.searchsorted(number, number[-1]))
-        waiting = [found.iloc[whole:]]
-        if whole:
-            yield found.iloc[:whole]
-    if waiting:
-        yield waiting[0].reset_index(drop=True)
+    sides = tables_of(database, sides_query(first.column_names), SIDES)
+    for table in whole_groups(sides, "building_number"):
+        yield table.to_pandas()
 
 
 def sides_query(names: Sequence[str]) -> str:
@@ -198,20 +192,21 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
         pq.ParquetFile(rows.absolute(), pre_buffer=False) as first,
         pq.ParquetFile(contacts.absolute(), pre_buffer=False) as second,
     ):
-        known = second.schema_arrow.names
-        carried = [name for name in (*OF_PAIRS, AREA) if name in known]
+        carried = [name for name in (*OF_PAIRS, AREA) if name in second.schema_arrow.names]
         # Both files have the same rows in the same groups
         for group in range(first.num_row_groups):
             table = first.read_row_group(group, columns=list(_OF_ROWS), use_threads=False)
             pairs = second.read_row_group(group, columns=carried, use_threads=False)
-            area = _areas(table, pairs, totals)
+            columns = directions(table["azimuth"], table["flags"])
+            columns["area"] = _areas(table, pairs, totals)
             # Columns that the pair table does not have are empty
             for name in OF_PAIRS:
-                column = pairs[name] if name in known else pa.nulls(pairs.num_rows, pa.float64())
-                table = table.append_column(name, column)
-            for name, direction in directions(table["azimuth"], table["flags"]).items():
-                table = table.append_column(name, pa.array(direction))
-            yield table.drop_columns(["longitude", "latitude"]).append_column("area", area)
+                empty = pa.nulls(pairs.num_rows, pa.float64())
+                columns[name] = pairs[name] if name in carried else empty
+            table = table.drop_columns(["longitude", "latitude"])
+            for name, column in columns.items():
+                table = table.append_column(name, pa.array(column))
+            yield table
 
 
 def _areas(table: pa.Table, pairs: pa.Table, totals: Totals) -> pa.Array:
@@ -222,26 +217,12 @@ def _areas(table: pa.Table, pairs: pa.Table, totals: Totals) -> pa.Array:
     return pa.array(areas_of(frame, totals, AREA), pa.string())
 
 
-def _write_ranked(
-    database: duckdb.DuckDBPyConnection, unranked: Path, table: Path, facts: Mapping[str, str]
-) -> None:
-    """Write all buildings in the order of their ranking, with their rank from 1."""
-    # By their ranking, without the numbers by which they were made
-    names = ", ".join(column.name for column in BUILDINGS[1:])
-    query = f"SELECT {names} FROM buildings ORDER BY {_ORDER}"
-    statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
-    schema = schema_of(BUILDINGS, statement)
-    dictionaries = text_columns(schema)
-    before, unnumbered = 0, pa.schema(list(schema)[1:])
-    with (
-        stored_rows(unranked) as stored,
-        written_whole(table) as part,
-        pq.ParquetWriter(part, schema, use_dictionary=dictionaries) as writer,
-    ):
-        database.register("buildings", stored)
-        found = (pa.Table.from_batches([batch]) for batch in batches(database, query, ROWS))
-        # Ranks count from 1
-        for rows in regrouped(found, unnumbered, ROWS):
-            rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
-            writer.write_table(pa.table([rank, *rows.columns], schema=schema))
-            before += rows.num_rows
+def _ranked(database: duckdb.DuckDBPyConnection, schema: pa.Schema) -> Iterator[pa.Table]:
+    """Yield all buildings in the order of their ranking, with their rank from 1."""
+    unnumbered, before = schema.remove(0), 0
+    # Without the numbers by which they were made
+    query = f"SELECT {', '.join(unnumbered.names)} FROM buildings ORDER BY {_ORDER}"
+    for rows in regrouped(tables_of(database, query, RANKED), unnumbered, RANKED):
+        rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
+        yield pa.table([rank, *rows.columns], schema=schema)
+        before += rows.num_rows

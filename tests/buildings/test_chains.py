@@ -1,8 +1,4 @@
-"""
-Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row.
-
-Tested here as well: per_obspy.inventory.building_rows.walks.
-"""
+"""Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row."""
 
 import time
 from itertools import pairwise
@@ -10,32 +6,97 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from per_obspy.inventory.building_rows.chains import ROW_FLAGS, chains_of
-from per_obspy.inventory.building_rows.contacts import contacts_of
-from per_obspy.inventory.building_rows.given import given_values
-from per_obspy.inventory.building_rows.joints import joints_of
+from per_obspy.buildings.chains import ROW_FLAGS, chains_of
+from per_obspy.buildings.contacts import contacts_of
+from per_obspy.buildings.joints import joints_of
 
-from .street import street, terrace
+from .street import street, table_of, terrace
 
 
 def rows_of(table, angle=30.0, longest=30):
     """Return the buildings of each row along its axis, its flags, and all that was found."""
-    contacts = contacts_of(table, angle)
-    joints = joints_of(contacts, given_values(table), angle)
-    chains = chains_of(contacts, joints, angle, longest)
-    rows, flags = [], []
+    pairs = table_of(table)
+    contacts = contacts_of(pairs, angle)
+    chains = chains_of(contacts, joints_of(contacts, pairs, angle), angle, longest)
+    names = np.stack([side.to_numpy() for side in contacts.names], axis=1)
+    found = []
     for number, (begin, end) in enumerate(pairwise(chains.first.tolist())):
+        pair, turned = chains.pair[begin:end], chains.turned[begin:end]
         sides = [
-            contacts.names[contacts.buildings[pair][:: -1 if turned else 1]].tolist()
-            for pair, turned in zip(chains.pair[begin:end], chains.turned[begin:end], strict=True)
+            names[k][:: -1 if back else 1].tolist() for k, back in zip(pair, turned, strict=True)
         ]
         # each contact begins with the building with which the one before ends
         assert all(one[1] == two[0] for one, two in pairwise(sides))
-        rows.append([sides[0][0], *(side[1] for side in sides)])
-        flags.append({name for name in ROW_FLAGS if chains.flags[name][number]})
+        flags = {name for name in ROW_FLAGS if chains.flags[name][number]}
+        first = contacts.order[pair].min()
+        found.append((first, [sides[0][0], *(side[1] for side in sides)], flags))
+    # rows are in any order: by the first of the names of their pairs
+    found.sort(key=lambda row: row[0])
+    rows, flags = [row for _, row, _ in found], [raised for _, _, raised in found]
     kept = np.flatnonzero(~contacts.repeated)
     assert sorted(chains.pair.tolist()) == kept.tolist()
     return rows, flags, chains
+
+
+#: Name of a case -> pairs, further columns, rows, and flags of each row.
+CASES = {
+    "a corner building is in two rows": (
+        [("a", "b", 90, 0), ("b", "c", 90, 0), ("c", "d", 0, 0)],
+        {},
+        [["a", "b", "c"], ["c", "d"]],
+        [set(), set()],
+    ),
+    "pairs without names are rows of two": (
+        [("", "", 90, 0), ("", "", 90, 0)],
+        {},
+        [["p0#1", "p0#2"], ["p1#1", "p1#2"]],
+        [{"no_building_id"}] * 2,
+    ),
+    "the other branch of a fork is a separate row": (
+        [("a", "b", 90, 0.0), ("b", "c", 90, 0.1), ("b", "d", 90, 0.2)],
+        {},
+        [["a", "b", "c"], ["b", "d"]],
+        [{"fork"}] * 2,
+    ),
+    "contradictory pairs cut a row": (
+        [("a", "b", 90, 0), ("b", "c", 90, 0)],
+        {"period_1": [9.0, 0.5], "period_2": [0.6, 9.0]},
+        [["a", "b"], ["b", "c"]],
+        [{"contradictory"}] * 2,
+    ),
+    # The bend of 15 degrees at d; its building is in both rows
+    "a curved street is cut at its sharpest bend": (
+        list(zip("abcde", "bcdef", [90, 100, 110, 125, 135], [0.0] * 5, strict=True)),
+        {},
+        [["a", "b", "c", "d"], ["d", "e", "f"]],
+        [{"bent"}] * 2,
+    ),
+    "no row goes on across an unknown gap": (
+        [("a", "b", 90, 0), ("b", "c", 90, np.nan), ("c", "d", 90, 0)],
+        {},
+        [["a", "b"], ["b", "c"], ["c", "d"]],
+        [set(), {"unknown_gap"}, set()],
+    ),
+    "an assumed gap is followed and flagged": (
+        [("a", "b", 90, 0), ("b", "c", 90, 0.5)],
+        {"derived": ["", "gap"]},
+        [["a", "b", "c"]],
+        [{"unknown_gap"}],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_rows_and_flags(case):
+    pairs, columns, rows, flags = CASES[case]
+    assert rows_of(street(*pairs, **columns))[:2] == (rows, flags)
+
+
+def test_buildings_in_a_circle_along_one_azimuth_are_a_ring():
+    # impossible on the ground, possible in a table
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0.1), ("b", "c", 90, 0.3), ("c", "a", 90, 0.2)))
+    assert sorted(map(sorted, rows)) == [["a", "b", "c"], ["b", "c"]]
+    assert flags == [{"ring"}] * 2
 
 
 def test_a_terrace_is_one_row():
@@ -52,36 +113,11 @@ def test_a_row_is_named_from_azimuth_0_to_180():
     assert chains.azimuth[0] == pytest.approx(90.0)
 
 
-def test_a_corner_building_is_in_two_rows():
-    rows, flags, _ = rows_of(street(("a", "b", 90, 0), ("b", "c", 90, 0), ("c", "d", 0, 0)))
-    assert rows == [["a", "b", "c"], ["c", "d"]]
-    assert flags == [set(), set()]
-
-
-def test_pairs_without_names_are_rows_of_two():
-    rows, flags, _ = rows_of(street(("", "", 90, 0), ("", "", 90, 0)))
-    assert rows == [["p0#1", "p0#2"], ["p1#1", "p1#2"]]
-    assert flags == [{"no_building_id"}] * 2
-
-
 def test_an_unknown_axis_is_a_row_of_two():
     rows, flags, chains = rows_of(street(("a", "b", np.nan, 0), ("b", "c", 90, 0)))
     assert rows == [["a", "b"], ["b", "c"]]
     assert flags == [{"unknown_azimuth"}, set()]
     assert np.isnan(chains.azimuth[0])
-
-
-def test_the_other_branch_of_a_fork_is_a_row_of_its_own():
-    rows, flags, _ = rows_of(street(("a", "b", 90, 0.0), ("b", "c", 90, 0.1), ("b", "d", 90, 0.2)))
-    assert rows == [["a", "b", "c"], ["b", "d"]]
-    assert flags == [{"fork"}] * 2
-
-
-def test_contradictory_pairs_cut_a_row():
-    table = street(("a", "b", 90, 0), ("b", "c", 90, 0))
-    rows, flags, _ = rows_of(table.assign(period_1=[9.0, 0.5], period_2=[0.6, 9.0]))
-    assert rows == [["a", "b"], ["b", "c"]]
-    assert flags == [{"contradictory"}] * 2
 
 
 def test_a_ring_around_a_square_is_cut_at_its_widest_gap():
@@ -94,22 +130,6 @@ def test_a_ring_around_a_square_is_cut_at_its_widest_gap():
     # the rest turns by 300 degrees, and a row by 40 at most
     assert all(len(row) <= 3 for row in rows)
     assert all("ring" in found for found in flags)
-
-
-def test_buildings_in_a_circle_along_one_azimuth_are_a_ring():
-    # impossible on the ground, possible in a table
-    rows, flags, _ = rows_of(street(("a", "b", 90, 0.1), ("b", "c", 90, 0.3), ("c", "a", 90, 0.2)))
-    assert sorted(map(sorted, rows)) == [["a", "b", "c"], ["b", "c"]]
-    assert flags == [{"ring"}] * 2
-
-
-def test_a_curved_street_is_cut_at_its_sharpest_bend():
-    azimuth = [90, 100, 110, 125, 135]
-    pairs = [(f"b{k}", f"b{k + 1}", angle, 0.0) for k, angle in enumerate(azimuth)]
-    rows, flags, _ = rows_of(street(*pairs))
-    # the bend of 15 degrees at b3; its building is in both rows
-    assert rows == [["b0", "b1", "b2", "b3"], ["b3", "b4", "b5"]]
-    assert flags == [{"bent"}] * 2
 
 
 def test_a_long_row_is_cut_at_its_widest_gap():
@@ -170,16 +190,3 @@ def test_of_a_ring_only_one_gap_is_cut():
     assert sum(len(row) - 1 for row in rows) == count
     assert sorted(map(len, rows))[0] == 2
     assert max(map(len, rows)) == 5
-
-
-def test_no_row_goes_on_across_an_unknown_gap():
-    rows, flags, _ = rows_of(street(("a", "b", 90, 0), ("b", "c", 90, np.nan), ("c", "d", 90, 0)))
-    assert rows == [["a", "b"], ["b", "c"], ["c", "d"]]
-    assert flags == [set(), {"unknown_gap"}, set()]
-
-
-def test_an_assumed_gap_is_followed_and_flagged():
-    table = street(("a", "b", 90, 0), ("b", "c", 90, 0.5), derived=["", "gap"])
-    rows, flags, _ = rows_of(table)
-    assert rows == [["a", "b", "c"]]
-    assert flags == [{"unknown_gap"}]

@@ -1,6 +1,6 @@
 """Columns of ``rows.parquet`` and ``buildings.parquet``, with units, meanings and flags."""
 
-from per_obspy.inventory.building_rows.chains import ROW_FLAGS
+from per_obspy.buildings.chains import ROW_FLAGS
 from per_obspy.inventory.schema import Column
 
 #: Flags of the history of a row, and the meaning of each.

@@ -1,10 +1,4 @@
-"""
-Rows of buildings in a run: the same bytes however it is cut, resumed, or shared between processes.
-
-The modules of its tables are tested here as well: per_obspy.tables.building_rows and
-per_obspy.tables.buildings; and its steps: per_obspy.pipeline.rows.all_rows,
-per_obspy.pipeline.rows.found_rows and per_obspy.pipeline.rows.pair_columns.
-"""
+"""Rows of buildings in a run: the same bytes however it is cut, resumed, or shared by processes."""
 
 import json
 import shutil
@@ -14,11 +8,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from per_obspy.buildings.columns import BUILDINGS, ROWS
 from per_obspy.pipeline.run import report, screen
-from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 from per_obspy.tables.table_files import rounded
 
-from ..small_run import InProcess, write_configuration
+from .small_run import InProcess, write_configuration
 
 pytestmark = pytest.mark.usefixtures("plain_reports")
 
@@ -113,10 +107,8 @@ def test_totals_count_every_building_once(finished):
 def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     before = content(copied)
     shutil.rmtree(copied / "out" / "rows")
-    for name in ("all_rows.PIECE", "all_rows.CHUNK", "found_rows.TOGETHER"):
-        monkeypatch.setattr(f"per_obspy.pipeline.rows.{name}", size)
-    monkeypatch.setattr("per_obspy.pipeline.rows.pair_columns.TOGETHER", size)
-    monkeypatch.setattr("per_obspy.tables.buildings.SIDES", size)
+    for name in ("search.PIECE", "search.CHUNK", "search.BATCH", "search.SORTED", "tables.SIDES"):
+        monkeypatch.setattr(f"per_obspy.buildings.{name}", size)
     assert screened(copied)["row_chunks"] > 3
     assert content(copied) == before
 

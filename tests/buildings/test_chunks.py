@@ -7,16 +7,16 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
+from per_obspy.buildings.columns import ROWS
 from per_obspy.jobs import building_rows
 from per_obspy.jobs.building_rows import RowsJob, do_row_chunks, rows_rejections
-from per_obspy.screening.building_rows.row_columns import ROWS
 
 
 def contacts(**changes):
     """Return a row of three buildings and a row of two, with the columns of their interfaces."""
     table = {column.name: np.zeros(3) for column in ROWS if column.dtype != "str"}
     texts = {column.name: np.array(["a", "b", "c"]) for column in ROWS if column.dtype == "str"}
-    table |= texts | {"row_id": np.array(["R-a", "R-a", "R-c"]), "row": np.array([4, 4, 5])}
+    table |= texts | {"row_id": np.array(["R-a", "R-a", "R-c"])}
     return pa.Table.from_pandas(pd.DataFrame(table | {"flags": ["", "", "fork"]} | changes))
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
 
 def street(*pairs, **columns):
@@ -28,3 +29,12 @@ def terrace(count, azimuth=90.0, gaps=0.0):
     names = [f"b{number:04}" for number in range(count)]
     width = np.broadcast_to(gaps, count - 1)
     return street(*zip(names[:-1], names[1:], [azimuth] * (count - 1), width, strict=True))
+
+
+def table_of(pairs):
+    """Return pairs as the search reads them, with the numbers of their identifiers."""
+    names = [pairs.get(f"building_id_{i}", pd.Series("", index=pairs.index)) for i in (1, 2)]
+    occurring = sorted({*names[0], *names[1]} - {""})
+    codes = {name: number for number, name in enumerate(occurring)} | {"": -1}
+    numbers = {f"code_{i}": name.map(codes) for i, name in enumerate(names, 1)}
+    return pa.Table.from_pandas(pairs.assign(**numbers), preserve_index=False)

@@ -1,21 +1,21 @@
-"""
-One row per building, from its sides and their pairs.
-
-Tested here as well: per_obspy.screening.building_rows.sides,
-per_obspy.screening.building_rows.prevention and per_obspy.screening.building_rows.row_columns.
-"""
+"""One row per building, from its sides and their pairs."""
 
 import duckdb
 import numpy as np
 import pandas as pd
 import pytest
 
-from per_obspy.screening.building_rows.buildings import building_table
-from per_obspy.screening.building_rows.prevention import ELSEWHERE, MEASURE, NOTHING
-from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
-from per_obspy.screening.building_rows.sides import OF_PAIRS, directions
+from per_obspy.buildings.columns import BUILDINGS, ROWS
+from per_obspy.buildings.sides import (
+    ELSEWHERE,
+    MEASURE,
+    NOTHING,
+    OF_PAIRS,
+    building_table,
+    directions,
+)
+from per_obspy.buildings.tables import sides_query
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
-from per_obspy.tables.buildings import sides_query
 
 CLASSES = {"high": 0.2, "low": 0.0}
 

@@ -1,1 +1,0 @@
-"""Rows of neighbouring buildings, found from pairs."""

@@ -1,1 +1,0 @@
-"""Rows of buildings as a stage of a run."""

@@ -1,1 +1,0 @@
-"""Exact histories of rows of buildings, and one row per building."""
