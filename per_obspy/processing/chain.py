@@ -9,17 +9,19 @@ from obspy.core.event import Event
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.noise.windows import Source, source_of
-from per_obspy.processing.notes import rejection, taken
-from per_obspy.processing.station.components import (
+from per_obspy.processing.account import is_processed, rejection, taken
+from per_obspy.processing.components import (
     instruments,
     is_horizontal,
-    oriented,
-    told_apart,
+    orient,
+    split_structures,
+    tell_apart,
 )
-from per_obspy.processing.station.merging import merged
-from per_obspy.processing.station.structures import kept_apart
+from per_obspy.processing.earthquake import Source, source_of
+from per_obspy.processing.filter.baseline import without_mean
+from per_obspy.processing.instrument import process_instrument
+from per_obspy.processing.instrument_response import in_acceleration
+from per_obspy.processing.merging import merged
 
 #: Settings of an empty configuration.
 DEFAULTS = Processing()
@@ -89,7 +91,7 @@ def process_station(
     Parameters
     ----------
     stream : iterable of obspy Trace
-        All channels of one station, unchanged by it. From :func:`.notes.taken`, so that no other
+        All channels of one station, unchanged by it. From :func:`.account.taken`, so that no other
         code holds them, raw records leave memory on the way.
     settings : Processing
         Every number of the chain.
@@ -104,10 +106,15 @@ def process_station(
         One row per trace; a bad trace is rejected alone. Sensors in structures are among them: they
         recorded the structure, not the ground; `process_instruments` processes them.
     """
-    ground, structure = kept_apart(stream)
+    ground, structure = split_structures(stream)
     candidates, unusable = process_instruments(taken(ground), settings, event)
-    best = max(candidates, key=_components, default=Stream())
     rejected = list(unusable)
+
+    # Horizontals first, then all components
+    def components(traces: Stream) -> tuple[int, int]:
+        return sum(map(is_horizontal, traces)), len(traces)
+
+    best = max(candidates, key=components, default=Stream())
     # Other instruments at the same place
     for traces in candidates:
         if traces is not best:
@@ -123,11 +130,6 @@ def process_station(
         reason = f"in a structure ({trace.stats.sensor_location}): kept apart"
         rejected.append(rejection(trace, reason))
     return best, tuple(rejected)
-
-
-def _components(traces: Stream) -> tuple[int, int]:
-    """Return the number of horizontals of an instrument, and of all its components."""
-    return sum(map(is_horizontal, traces)), len(traces)
 
 
 def process_instruments(
@@ -151,17 +153,56 @@ def process_instruments(
     rejected : tuple of Rejection
     """
     whole, broken = merged(stream)
-    source = source_of(event) if isinstance(event, Event) and event.origins else None
-    if isinstance(event, Source):
-        source = event
+    source = event if isinstance(event, Source) else None
+    if isinstance(event, Event) and event.origins:
+        source = source_of(event)
     processed, rejected = [], list(broken)
     # Each instrument by itself
     for instrument in instruments(taken(whole)):
-        components, unclear = told_apart(instrument)
+        components, unclear = tell_apart(instrument)
         # Each component has one owner, and leaves memory when it is done
         instrument.clear()
-        directed = oriented(taken(components))
-        traces, unusable = process_instrument(taken(directed), settings, source)
+        directed = map(orient, taken(components))
+        traces, unusable = process_instrument(directed, settings, source)
         processed += [traces] if traces else []
         rejected += (*unclear, *unusable)
     return processed, tuple(rejected)
+
+
+def before_processing(stream: Stream, processed: Trace, settings: Processing) -> Trace | None:
+    """
+    Return the raw record of a processed trace in m/s2 over the processed time.
+
+    Only the mean of its noise is removed.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        All channels of the station as read.
+    processed : obspy Trace
+        From `process_station`.
+    settings : Processing
+        Settings of that processing.
+
+    Returns
+    -------
+    obspy Trace or None
+        None if the record came processed by others.
+    """
+    whole, _ = merged(
+        trace for trace in stream if trace.id == processed.id and not is_processed(trace)
+    )
+    if not whole:
+        return None
+    physical = in_acceleration(whole[0], settings.gain_tolerance)
+    # Start of the processed record without its pads, s and samples after that of the raw one
+    chosen, dt = processed.stats.per_obspy, processed.stats.delta
+    before = round(float(chosen.get("pad_before", 0.0)) / dt)
+    after = round(float(chosen.get("pad_after", 0.0)) / dt)
+    start = processed.stats.starttime + before * dt - physical.stats.starttime
+    first = max(round(start / physical.stats.delta), 0)
+    # The samples between the pads
+    count = processed.stats.npts - (before + after)
+    physical.data = physical.data[first : first + count]
+    physical.stats.starttime += first * physical.stats.delta
+    return without_mean(physical, float(chosen.noise))

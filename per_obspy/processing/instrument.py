@@ -1,38 +1,53 @@
 """
 Steps of one instrument in their order.
 
-Checks, m/s2, noise, baseline, corners, filter, usable periods.
+Checks, m/s2, noise, baseline, corners, filter, usable periods. Records processed by others pass
+with the corners of their header.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import filterfalse
 
 from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
-from per_obspy.processing.already_processed import passed_through
-from per_obspy.processing.filter.baseline_and_corners import corners_noted, offset_kept
-from per_obspy.processing.filter.butterworth import filtered, padded
+from per_obspy.processing.account import (
+    CLIPPED,
+    SILENT_HEADER,
+    is_processed,
+    judge,
+    lenient,
+    rejection,
+    survivors,
+    taken,
+    with_flags,
+    with_note,
+    with_numbers,
+)
+from per_obspy.processing.components import is_horizontal, paired
+from per_obspy.processing.earthquake import Corner, Source, fallback_highpass
+from per_obspy.processing.filter.butterworth import bandpass, pad, taper
 from per_obspy.processing.filter.corners import (
-    Corner,
-    corners_shared,
-    fallback_highpass,
-    usable_periods_noted,
+    LOWPASS_OF_NYQUIST,
+    choose_corners,
+    clean_corner,
+    keep_offset,
+    lowest_highpass,
+    share_corners,
+    with_usable_periods,
 )
 from per_obspy.processing.instrument_response import in_acceleration
-from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
-from per_obspy.processing.notes import copied, is_processed, rejection, taken
-from per_obspy.processing.quality.final_checks import final_findings
-from per_obspy.processing.quality.findings import Finding, judged, surviving
-from per_obspy.processing.quality.physical_limits import acceleration_findings, component_findings
-from per_obspy.processing.quality.raw_checks import CLIPPED, raw_findings
-from per_obspy.processing.quality.record_flags import flags_noted
-from per_obspy.processing.station.components import is_horizontal, paired
-
-#: A step takes a Stream and returns a new one.
-Step = Callable[[Stream], Stream]
+from per_obspy.processing.motion_checks import (
+    AT_REST,
+    acceleration_findings,
+    component_findings,
+    final_findings,
+)
+from per_obspy.processing.noise_window import noise_windows, trim
+from per_obspy.processing.raw_checks import final_sample_findings, raw_findings
 
 
 def process_instrument(
@@ -59,42 +74,38 @@ def process_instrument(
     rejected : tuple of Rejection
     """
     components = Stream(list(instrument))
-    if components and is_processed(components[0]):
-        # Series of velocity or displacement are no acceleration
-        pair, rejected = _physical_pair(components, settings, _conversion_steps(settings)[1:])
-        compared = _compared(pair, settings)
-        passed, unfit = _in_turn(
-            taken(pair), (compared, partial(passed_through, settings=settings))
-        )
-        return passed, (*rejected, *unfit)
-    # Each component in m/s2, then all of them around the shaking
-    windowed, unusable = _windowed(components, settings, source)
+    is_final = bool(components) and is_processed(components[0])
+    pair, unusable = _physical_pair(components, settings, is_final)
+    if is_final:
+        passing = _judged_step(pair, settings, partial(pass_through, settings=settings))
+        passed, unfit = survivors(passing, taken(pair))
+        return passed, (*unusable, *unfit)
+    # All components around the shaking
+    for trace in taken(noise_windows(taken(pair), settings, source)):
+        pair += trim(trace, settings.longest_noise, settings.longest_signal)
     # Baseline and corners of each component; the horizontals share the narrower band
-    steps = _baseline_steps(windowed, settings, source)
-    ready, undecided = _in_turn(taken(windowed), steps)
-    banded = _horizontals_banded(taken(ready))
-    done, restless = _in_turn(taken(banded), _filter_steps(settings))
-    return flags_noted(done), (*unusable, *undecided, *restless)
-
-
-def _in_turn(
-    stream: Iterable[Trace], steps: Iterable[Step]
-) -> tuple[Stream, tuple[Rejection, ...]]:
-    """Apply steps in turn to each trace by itself."""
-
-    def apply(single: Stream) -> Stream:
-        for step in steps:
-            single = step(single)
-        return single
-
-    return surviving(apply, stream)
+    step = _judged_step(pair, settings, _corner_step(pair, settings, source))
+    ready, undecided = survivors(step, taken(pair))
+    verticals = Stream(list(filterfalse(is_horizontal, ready)))
+    ready = share_corners(filter(is_horizontal, taken(ready))) + verticals
+    verticals.clear()
+    done, restless = survivors(partial(_filter, settings=settings), taken(ready))
+    return done, (*unusable, *undecided, *restless)
 
 
 def _physical_pair(
-    components: Stream, settings: Processing, steps: Iterable[Step]
+    components: Stream, settings: Processing, is_final: bool
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """Return the components in m/s2, the horizontals over their common time; empty the input."""
-    physical, unfit = _in_turn(taken(components), steps)
+
+    def convert(trace: Trace) -> Trace:
+        if not is_final:
+            trace = judge(trace, raw_findings(trace, settings.checks))
+        # Series of velocity or displacement are no acceleration
+        trace = in_acceleration(trace, settings.gain_tolerance)
+        return judge(trace, acceleration_findings(trace, settings.checks))
+
+    physical, unfit = survivors(convert, taken(components))
     # Sensor and recorder are one: what one component lost at their limit, others lost as well
     clipped = [
         row.name for row in unfit if any(reason.startswith(CLIPPED) for reason in row.reasons)
@@ -102,55 +113,29 @@ def _physical_pair(
     if clipped:
         reason = f"{CLIPPED}: {', '.join(clipped)} of the same instrument"
         return Stream(), (*unfit, *(rejection(trace, reason) for trace in physical))
-    pair, unpaired = paired(physical, settings.overlap)
+    pair, unpaired = paired(taken(physical), settings.overlap)
     return pair, (*unfit, *unpaired)
 
 
-def _compared(stream: Stream, settings: Processing) -> Step:
-    """Return the step that judges each component of a stream by the others."""
-    findings = component_findings(stream, settings.checks)
-    return lambda single: judged(single[0], findings.get(single[0].id, []))
+def _judged_step(
+    pair: Stream, settings: Processing, step: Callable[[Trace], Trace]
+) -> Callable[[Trace], Trace]:
+    """Return a step that first judges each component by the others."""
+    findings = component_findings(pair, settings.checks)
+    return lambda trace: step(judge(trace, findings.get(trace.id, ())))
 
 
-def _horizontals_banded(stream: Iterable[Trace]) -> Stream:
-    """Return the components, horizontals first and with the narrower of their bands."""
-    horizontals, verticals = Stream(), Stream()
-    for trace in stream:
-        group = horizontals if is_horizontal(trace) else verticals
-        group.append(trace)
-    return corners_shared(horizontals) + verticals
-
-
-def _conversion_steps(settings: Processing) -> tuple[Step, ...]:
-    """Return the checks of raw samples, the conversion to m/s2, and the limits of its peak."""
-    return (
-        lambda stream: judged(stream[0], raw_findings(stream[0], settings.checks)),
-        partial(in_acceleration, gain_tolerance=settings.gain_tolerance),
-        lambda stream: judged(stream[0], acceleration_findings(stream[0], settings.checks)),
-    )
-
-
-def _windowed(
-    components: Stream, settings: Processing, source: Source | None
-) -> tuple[Stream, tuple[Rejection, ...]]:
-    """Return physical components with noise windows, around the shaking; empty the input."""
-    pair, rejected = _physical_pair(components, settings, _conversion_steps(settings))
-    noted_windows = noise_window_noted(
-        pair,
-        settings.onset_margin,
-        settings.shortest_noise,
-        settings.pick_tolerance,
-        source,
-        settings.pre_event,
-    )
-    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal), rejected
-
-
-def _baseline_steps(
-    stream: Stream, settings: Processing, source: Source | None
-) -> tuple[Step, ...]:
-    """Return the comparison of the components, and the choice of baseline and corners."""
-    magnitude = source.magnitude if source else _header_magnitude(stream)
+def _corner_step(
+    pair: Stream, settings: Processing, source: Source | None
+) -> Callable[[Trace], Trace]:
+    """Return the step that chooses baseline and corners."""
+    # The permanent offset is kept on request only
+    if settings.permanent_offset:
+        return partial(keep_offset, settings=settings)
+    # The first magnitude in the headers, where there is no event
+    magnitudes = [trace.stats.get("event", {}).get("magnitude") for trace in pair]
+    in_header = next((float(magnitude) for magnitude in magnitudes if magnitude), None)
+    magnitude = source.magnitude if source else in_header
 
     def fallback() -> Corner:
         corner = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
@@ -158,55 +143,86 @@ def _baseline_steps(
             source.note(highpass=list(corner))
         return corner
 
-    # The permanent offset is kept on request only
+    return partial(choose_corners, settings=settings, fallback=fallback)
+
+
+def _filter(trace: Trace, settings: Processing) -> Trace:
+    """Return the filtered record with usable periods and flags, marked as processed."""
+    chosen, order = trace.stats.per_obspy, settings.order
+    corners = AttribDict(highpass=chosen.highpass, lowpass=chosen.lowpass)
     if settings.permanent_offset:
-        chosen: Step = partial(offset_kept, settings=settings)
+        trace = bandpass(trace, 0.0, corners.lowpass, order)
     else:
-        chosen = partial(corners_noted, settings=settings, fallback=fallback)
-    return _compared(stream, settings), chosen
+        padded = pad(trace, corners.highpass, order)
+        trace = bandpass(padded, corners.highpass, corners.lowpass, order)
+        del padded
+    trace = with_usable_periods(trace, settings.usable)
+    findings = [
+        finding
+        for finding in final_findings(trace, settings.checks)
+        if not (settings.permanent_offset and finding.check == "final_displacement")
+    ]
+    # A second pass keeps a processed record with its corners
+    trace = with_numbers(judge(trace, findings))
+    trace.stats.processing_level, trace.stats.corners = "processed", corners
+    return with_flags(trace)
 
 
-def _header_magnitude(stream: Stream) -> float | None:
-    """Return the first magnitude in the headers, if there is one."""
-    magnitudes = (trace.stats.get("event", {}).get("magnitude") for trace in stream)
-    return next((float(magnitude) for magnitude in magnitudes if magnitude), None)
+def pass_through(trace: Trace, settings: Processing) -> Trace:
+    """
+    Return a copy of a record processed by others, with its corners and usable periods.
 
+    Without a high-pass corner in the header, the corner that would clean the displacement limits
+    the usable periods (no filter is applied); without a low-pass corner, 0.75 of the Nyquist
+    frequency. Velocity or displacement that does not come to rest, and a peak that is not the
+    header's, are warnings: the samples are final. What no ground motion can be is rejected as in
+    raw records.
 
-def _filter_steps(settings: Processing) -> tuple[Step, ...]:
-    """Return the filter, the usable periods, the last checks and the mark of a processed trace."""
-    return (
-        partial(
-            _low_passed if settings.permanent_offset else _padded_and_filtered, order=settings.order
-        ),
-        partial(usable_periods_noted, usable=settings.usable),
-        lambda stream: judged(stream[0], _final_findings(stream[0], settings)),
-        _marked,
+    Parameters
+    ----------
+    trace : obspy Trace
+        Acceleration, m/s2.
+    settings : Processing
+        Every number of the chain.
+
+    Returns
+    -------
+    obspy Trace
+
+    Raises
+    ------
+    RecordRejected
+        If a check rejects, with every reason.
+    """
+    header = trace.stats.get("corners", {})
+    if header.get("highpass"):
+        highpass = Corner(header["highpass"], "header")
+    else:
+        highpass = _limiting_highpass(trace, settings)
+    # Corners like 999 Hz mean none
+    nyquist = trace.stats.sampling_rate / 2
+    lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, f"0.75 Nyquist, {SILENT_HEADER}")
+    if 0 < header.get("lowpass", 0) < nyquist:
+        lowpass = Corner(header["lowpass"], "header")
+    out = with_note(
+        trace,
+        "processed already, passed through",
+        highpass=float(highpass.frequency),
+        highpass_source=highpass.reason,
+        lowpass=float(lowpass.frequency),
+        lowpass_source=lowpass.reason,
     )
+    findings = final_sample_findings(trace, settings.checks)
+    # Their corners are no choice of this program
+    findings += final_findings(trace, lenient(settings.checks, AT_REST))
+    return with_flags(with_usable_periods(judge(out, findings), settings.usable))
 
 
-def _padded_and_filtered(stream: Stream, order: int) -> Stream:
-    """Return the padded and filtered record, by the corners of its component."""
-    highpass, lowpass = stream[0].stats.per_obspy.highpass, stream[0].stats.per_obspy.lowpass
-    return filtered(padded(stream, highpass, order), highpass, lowpass, order)
-
-
-def _low_passed(stream: Stream, order: int) -> Stream:
-    """Return the record low-passed at the corner of its component."""
-    return filtered(stream, 0.0, stream[0].stats.per_obspy.lowpass, order)
-
-
-def _final_findings(trace: Trace, settings: Processing) -> Iterator[Finding]:
-    """Yield the findings of motion that does not come to rest, but for a permanent offset."""
-    for finding in final_findings(trace, settings.checks):
-        if not (settings.permanent_offset and finding.check == "final_displacement"):
-            yield finding
-
-
-def _marked(stream: Stream) -> Stream:
-    """Return a copy marked as processed, with its corners, so that a second pass keeps it."""
-    out = copied(stream)
-    for trace in out:
-        corners = trace.stats.per_obspy
-        trace.stats.processing_level = "processed"
-        trace.stats.corners = AttribDict(highpass=corners.highpass, lowpass=corners.lowpass)
-    return out
+def _limiting_highpass(trace: Trace, settings: Processing) -> Corner:
+    """Return the corner below which the displacement is not clean, as a limit of usable periods."""
+    highest = settings.highpass_range[1]
+    shape = taper(trace, settings.taper)
+    clean = clean_corner(shape, lowest_highpass(trace), highest, settings)
+    if clean is None:
+        return Corner(highest, f"displacement drifts at any corner, {SILENT_HEADER}")
+    return Corner(clean.frequency, f"{clean.reason}, {SILENT_HEADER}")

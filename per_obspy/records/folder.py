@@ -24,7 +24,7 @@ from per_obspy.formats.text.station_table import (
     read_station_table,
 )
 from per_obspy.machine import raise_machine_fault
-from per_obspy.processing.notes import taken
+from per_obspy.processing.account import taken
 from per_obspy.records.archives.archive_files import LIMITS, archive_files, read_file
 from per_obspy.records.archives.walked import is_archive
 from per_obspy.records.contents.file_list import files_below, is_document

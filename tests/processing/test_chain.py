@@ -210,7 +210,7 @@ def ridgecrest(real_data):
 @pytest.mark.parametrize("station", ["CCC", "WNM"])
 def test_the_response_is_removed_as_obspy_removes_it(ridgecrest, station):
     trace = ridgecrest.select(station=station, channel="HNE")[0]
-    found = in_acceleration(Stream([trace]), 0.1)[0].data
+    found = in_acceleration(trace, 0.1).data
     expected = trace.copy()
     expected.data = expected.data - expected.data.mean()
     expected.remove_response(

@@ -8,10 +8,10 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_instruments, process_station
+from per_obspy.processing.earthquake import Source
 from per_obspy.processing.filter.butterworth import acausal_bandpass
 from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.noise.windows import Source
-from per_obspy.processing.quality.final_checks import integrated
+from per_obspy.processing.motion_checks import integrate
 
 START = UTCDateTime(2020, 1, 1)
 SETTINGS = Processing()
@@ -150,14 +150,14 @@ def test_a_permanent_offset_is_kept_on_request(record, displacement):
         process_instrument(Stream([offset_record(record, size)]), settings, None)[0]
         for size in (0.0, displacement)
     )
-    without, final = (integrated(integrated(out))[0].data[-1] for out in (plain, offset))
+    without, final = (integrate(integrate(out[0])).data[-1] for out in (plain, offset))
     # the shift alone would move the ground by 1.4 m; the bridge over the shaking is a guess, good
     # to a decimetre or two
     assert abs(without) < 0.2
     assert final - without == pytest.approx(displacement, rel=0.15)
     # the chain for other records filters it away
     filtered, _ = process_instrument(Stream([offset_record(record, displacement)]), SETTINGS, None)
-    assert abs(integrated(integrated(filtered))[0].data[-1]) < 0.05
+    assert abs(integrate(integrate(filtered[0])).data[-1]) < 0.05
     chosen = offset[0].stats.per_obspy
     assert chosen.highpass_source.startswith("not applied")
     assert chosen.longest_period == pytest.approx(96.0)

@@ -5,7 +5,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Response
 
-from per_obspy.processing.notes import copied, is_processed, noted, rejection, taken
+from per_obspy.processing.account import copy_header, is_processed, rejection, taken, with_note
 
 
 def test_a_copy_is_equal_and_shares_nothing_but_samples_and_response():
@@ -15,17 +15,15 @@ def test_a_copy_is_equal_and_shares_nothing_but_samples_and_response():
         "starttime": UTCDateTime(2020, 1, 1),
         "corners": AttribDict(highpass=0.1),
     }
-    stream = Stream(
-        [Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]}), Trace()]
-    )
-    before, out = stream.copy(), copied(stream)
-    assert out == stream
-    assert out[0].stats.response is stream[0].stats.response
-    assert out[0].data is stream[0].data
+    trace = Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]})
+    before, out = trace.copy(), copy_header(trace)
+    assert out == trace
+    assert out.stats.response is trace.stats.response
+    assert out.data is trace.data
     # New samples and notes are those of the copy alone
-    out[0].data, out[0].stats.corners.highpass = out[0].data + 7.0, 0.2
-    out[0].stats.processing.append("two")
-    assert stream == before  # would catch a copy of the header that is not deep
+    out.data, out.stats.corners.highpass = out.data + 7.0, 0.2
+    out.stats.processing.append("two")
+    assert trace == before  # would catch a copy of the header that is not deep
 
 
 def test_traces_that_are_taken_leave_their_stream():
@@ -39,13 +37,14 @@ def test_traces_that_are_taken_leave_their_stream():
 
 def test_masked_samples_stay_masked():
     data = np.ma.masked_equal(np.arange(5.0), 2.0)
-    assert copied(Stream([Trace(data)]))[0].data.mask.tolist() == data.mask.tolist()
+    assert copy_header(Trace(data)).data.mask.tolist() == data.mask.tolist()
 
 
 def test_steps_are_listed_and_numbers_are_replaced():
-    trace = Trace(np.zeros(3))
-    noted(trace, "first step", corner=0.1)
-    noted(trace, "second step", corner=0.2, order=5)
+    given = Trace(np.zeros(3))
+    trace = with_note(given, "first step", corner=0.1)
+    trace = with_note(trace, "second step", corner=0.2, order=5)
+    assert "processing" not in given.stats
     assert trace.stats.processing == ["per_obspy: first step", "per_obspy: second step"]
     assert trace.stats.per_obspy == {"corner": 0.2, "order": 5}
 

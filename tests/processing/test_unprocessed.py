@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.config import Processing
-from per_obspy.processing.chain import process_station
-from per_obspy.processing.unprocessed import before_processing
+from per_obspy.processing.chain import before_processing, process_station
 
 START = UTCDateTime(2020, 1, 1)
 SETTINGS = Processing()

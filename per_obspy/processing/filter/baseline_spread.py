@@ -18,8 +18,8 @@ from scipy.signal.windows import tukey
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
+from per_obspy.processing.filter.baseline import final_line
 from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
-from per_obspy.processing.filter.velocity import final_line
 from per_obspy.spectra.elastic import per_spectrum
 
 #: Periods at which PER is compared, s.

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from per_obspy.checks import FloatArray
 from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
-from per_obspy.processing.long_records import is_long
+from per_obspy.processing.series import is_long
 
 #: Order of the polynomial that is the drift.
 POLYNOMIAL_ORDER = 5
