@@ -14,13 +14,12 @@ import numpy as np
 from obspy import Stream, Trace
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import uniform_filter1d
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
 from per_obspy.processing.account import Finding, Findings, with_note
-from per_obspy.processing.components import is_horizontal
-from per_obspy.processing.series import is_long, without_trend
+from per_obspy.processing.components import align, is_horizontal
+from per_obspy.processing.series import is_long, running_rms, without_line
 
 #: Fewest samples of a record whose components are compared.
 FEWEST = 500
@@ -152,18 +151,12 @@ def _common_motions(stream: Stream) -> dict[str, FloatArray]:
     intervals = {trace.stats.delta for trace in stream}
     if len(stream) < 2 or len(intervals) > 1 or any(is_long(trace.stats.npts) for trace in stream):
         return {}
-    # Samples before the common time, and in it
-    dt, latest = intervals.pop(), max(trace.stats.starttime for trace in stream)
-    skips = {trace.id: round((latest - trace.stats.starttime) / dt) for trace in stream}
-    count = min(trace.stats.npts - skips[trace.id] for trace in stream)
-    if count < FEWEST:
+    common = align(stream)
+    if min(trace.stats.npts for trace in common) < FEWEST:
         return {}
-    motions = dict[str, FloatArray]()
-    for trace in stream:
-        first = skips[trace.id]
-        motions[trace.id] = without_trend(trace.data[first : first + count], 1)
+    motions = {trace.id: without_line(trace.data) for trace in common}
     # A dead component has nothing to compare
-    return motions if all(np.any(motion) for motion in motions.values()) else {}
+    return motions if all(map(np.any, motions.values())) else {}
 
 
 def _compare_times(
@@ -192,8 +185,7 @@ def _compare_times(
 
 def _logarithmic_envelope(motion: FloatArray, dt: float, thin: int) -> FloatArray:
     """Return the logarithm of the smoothed size of a motion at steps, without its mean."""
-    power = uniform_filter1d(motion**2, max(round(SMOOTHING / dt), 1))[::thin]
-    size = np.sqrt(np.maximum(power, 0.0))
+    size = running_rms(motion, SMOOTHING, dt, "reflect")[::thin]
     logarithm = np.log(size + ENVELOPE_FLOOR * size.max())
     return np.asarray(logarithm - logarithm.mean())
 

@@ -13,7 +13,7 @@ from per_obspy.config import Processing
 from per_obspy.processing import components
 from per_obspy.processing.account import copy_header, with_note
 from per_obspy.processing.earthquake import Source, first_wave, p_arrival
-from per_obspy.processing.series import first_least, without_trend
+from per_obspy.processing.series import first_least, without_line
 
 TINY = np.finfo(float).tiny
 
@@ -187,7 +187,7 @@ def _between_1_and_20_hertz(samples: FloatArray, dt: float) -> FloatArray:
     """Return filtered samples: causally, so that no wave arrives early."""
     corners = [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)]
     sections = butter(2, corners, "bandpass", fs=1 / dt, output="sos")
-    return np.asarray(sosfilt(sections, without_trend(samples, 1)))
+    return np.asarray(sosfilt(sections, without_line(samples)))
 
 
 def aic_onset(samples: FloatArray) -> int:

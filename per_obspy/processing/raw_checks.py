@@ -6,17 +6,23 @@ the motion is, the peak of the header.
 """
 
 from functools import partial
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from obspy import Trace
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.ndimage import maximum_filter1d
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
 from per_obspy.processing.account import CLIPPED, Finding, Findings, lenient
-from per_obspy.processing.series import SIGNIFICANT, blocks, filter_blocks, runs, without_trend
+from per_obspy.processing.series import (
+    SIGNIFICANT,
+    blocks,
+    filter_blocks,
+    running_rms,
+    runs,
+    without_line,
+)
 
 #: Fewest samples and fewest different values of a record.
 FEWEST, FEWEST_LEVELS = 50, 3
@@ -87,7 +93,7 @@ def raw_findings(trace: Trace, checks: Checks) -> Findings:
     findings = Findings(checks)
     if _is_record(trace, findings):
         # The recorder, then the motion and its ends
-        level, dt = without_trend(trace.data, 1), trace.stats.delta
+        level, dt = without_line(trace.data), trace.stats.delta
         _check_recorder(trace, level, findings)
         rate = np.count_nonzero(np.diff(np.signbit(level))) / (level.size * dt)
         findings.compare("zero_crossings", rate)
@@ -108,7 +114,7 @@ def final_sample_findings(trace: Trace, checks: Checks) -> Findings:
     findings = Findings(lenient(checks, WARNINGS_OF_FINAL_SAMPLES))
     if _is_record(trace, findings):
         # What the processing may have left, and what no processing mends
-        level = without_trend(trace.data, 1)
+        level = without_line(trace.data)
         _check_recorder(trace, level, findings)
         _check_header(trace, findings)
         last = level[-_second(trace.stats.delta) :]
@@ -227,20 +233,6 @@ def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
     energy = np.cumsum((samples - samples.mean()) ** 2)
     first, last = (1 - SIGNIFICANT) * energy[-1], SIGNIFICANT * energy[-1]
     return np.asarray((energy >= first) & (energy <= last))
-
-
-def _running_rms(
-    samples: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
-) -> FloatArray:
-    """Return the running root mean square of samples over a time, s."""
-    width = max(round(seconds / dt), 1)
-
-    def root_mean_square(part: FloatArray) -> FloatArray:
-        means = uniform_filter1d(part**2, width, mode=mode)
-        # Rounding of the running sum may leave small negative values
-        return np.asarray(np.sqrt(np.maximum(means, 0)))
-
-    return filter_blocks(root_mean_square, samples, width)
 
 
 def pinned_samples(samples: FloatArray) -> int:
@@ -369,7 +361,7 @@ def longest_gaps(samples: FloatArray, dt: float) -> tuple[float, int]:
     count : int
         With both ends of the line.
     """
-    envelope = _running_rms(samples - np.median(samples), STANDSTILL_ENVELOPE, dt, "reflect")
+    envelope = running_rms(samples - np.median(samples), STANDSTILL_ENVELOPE, dt, "reflect")
     is_moving = envelope > MOVING * envelope.max()
     # Equal samples
     starts, stops = runs(np.diff(samples) == 0)
@@ -386,7 +378,7 @@ def _longest_line(samples: FloatArray, is_moving: NDArray[np.bool_], dt: float) 
     if not starts.size:
         return 0
     # Jumps at both ends are much larger than the largest one in the run
-    jumping = _running_rms(jumps, STANDSTILL_ENVELOPE, dt, "reflect")
+    jumping = running_rms(jumps, STANDSTILL_ENVELOPE, dt, "reflect")
     largest = np.maximum.reduceat(jumps, np.stack((starts, stops), axis=1).ravel())[::2]
     is_fill = is_moving[starts - 1] & is_moving[stops]
     is_fill &= largest <= STRAIGHT * np.minimum(jumping[starts - 1], jumping[stops])
@@ -460,7 +452,7 @@ def later_event(samples: FloatArray, dt: float) -> float:
     float
         Of the running root mean square, dimensionless.
     """
-    envelope = _running_rms(samples, ENVELOPE, dt, "constant")
+    envelope = running_rms(samples, ENVELOPE, dt, "constant")
     # First quiet sample after the main event, last one before it
     main, largest = int(envelope.argmax()), float(envelope.max())
     is_quiet = envelope < QUIET * largest

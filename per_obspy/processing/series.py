@@ -1,16 +1,17 @@
 """
-Series of samples: blocks of long ones, runs of equal conditions, energy, trends.
+Series of samples: blocks of long ones, runs of equal conditions, energy, running sizes, lines.
 
 Ordinary records are worked on at once; a record of a day in blocks, as the temporary arrays of
 most functions would take several times its memory.
 """
 
 from collections.abc import Callable, Iterator
+from typing import Literal
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.fft import rfft
+from scipy.ndimage import uniform_filter1d
 
 from per_obspy.checks import FloatArray
 
@@ -96,42 +97,29 @@ def significant_samples(acceleration: FloatArray) -> int:
     return int(np.searchsorted(energy, SIGNIFICANT * energy[-1])) + 1
 
 
-def trend(data: FloatArray, order: int) -> FloatArray:
+def running_rms(
+    samples: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
+) -> FloatArray:
+    """Return the running root mean square of samples over a time, s."""
+    width = max(round(seconds / dt), 1)
+
+    def root_mean_square(part: FloatArray) -> FloatArray:
+        means = uniform_filter1d(part**2, width, mode=mode)
+        # Rounding of the running sum may leave small negative values
+        return np.asarray(np.sqrt(np.maximum(means, 0)))
+
+    return filter_blocks(root_mean_square, samples, width)
+
+
+def without_line(data: FloatArray) -> FloatArray:
     """
-    Return the least-squares polynomial of evenly spaced samples.
+    Return evenly spaced samples without their least-squares straight line, in a new array.
 
-    Parameters
-    ----------
-    data : (n_samples,) ndarray
-        Any unit.
-    order : int
-        Of the polynomial.
-
-    Returns
-    -------
-    (n_samples,) ndarray
-        In the unit of the data.
-
-    Notes
-    -----
-    Legendre polynomials are nearly orthogonal there, so that the normal equations are as accurate
-    as an orthogonal decomposition, which takes the memory of a dozen records.
+    Places between -1 and 1 have no mean: the slope is that of the samples as they are.
     """
-    places = np.linspace(-1, 1, data.size)
-    # Sums of products over the blocks
-    products, moments = np.zeros((order + 1, order + 1)), np.zeros(order + 1)
-    for block in blocks(0, data.size):
-        basis = legvander(places[block], order)
-        products += basis.T @ basis
-        moments += basis.T @ data[block]
-    coefficients = np.linalg.solve(products, moments)
-    # The places give way to the values of the polynomial there
-    for block in blocks(0, data.size):
-        places[block] = legvander(places[block], order) @ coefficients
-    return places
-
-
-def without_trend(data: FloatArray, order: int) -> FloatArray:
-    """Return samples without their `trend`, in a new array."""
-    out = trend(data, order)
-    return np.subtract(data, out, out=out)
+    line = np.linspace(-1, 1, data.size)
+    # Sums of products: a product of vectors starts the threads of BLAS
+    if data.size > 1:
+        line *= np.sum(line * data) / np.sum(line**2)
+    line += data.mean()
+    return np.subtract(data, line, out=line)

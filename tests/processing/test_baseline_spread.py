@@ -41,15 +41,15 @@ def test_every_correction_brings_the_velocity_to_rest(earthquake):
     recorded = earthquake() + box(0.02, 24, 200) + box(0.1, 25, 28)
     line = final_line(recorded, TIME, SHAKING.end)
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
-    shifts = list(baseline_spread._possible_shifts(times, line, np.inf))
+    shifts = baseline_spread._possible_shifts(times, line, np.inf).toarray()
     assert len(shifts) == 55  # all pairs of 11 times
     steps = (times[:, np.newaxis] <= TIME).astype(float)
     for shift in shifts:
-        corrected = baseline_spread._corrected(recorded, steps, shift)
+        corrected = recorded - shift @ steps
         velocity = cumulative_trapezoid(corrected, dx=DT, initial=0)
         # the line is fitted by least squares to the velocity after the shaking: what is left has
         # neither mean nor slope there; a step starts up to one sample from its time
-        sample = DT * (abs(shift.between) + abs(shift.after))
+        sample = DT * (abs(shift[shift != 0][0]) + abs(shift.sum()))
         assert abs(velocity[SHAKING.end <= TIME].mean()) < sample + 1e-9
 
 
@@ -73,8 +73,11 @@ def test_the_spread_is_that_of_records_that_are_corrected_one_by_one(
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
     line = final_line(recorded, TIME, SHAKING.end)
     ratios, misfits, peak = [], [], 0.5 * np.abs(recorded).max()
-    for first, second, between, after in baseline_spread._possible_shifts(times, line, peak):
-        baseline = np.where(times[second] <= TIME, after, box(between, times[first], times[second]))
+    for row in baseline_spread._possible_shifts(times, line, peak).toarray():
+        (first, second), after = np.flatnonzero(row), row.sum()
+        baseline = np.where(
+            times[second] <= TIME, after, box(row[first], times[first], times[second])
+        )
         velocity = cumulative_trapezoid(recorded - baseline, dx=DT, initial=0)
         displacement = cumulative_trapezoid(velocity, dx=DT, initial=0)
         during = displacement[(SHAKING.onset <= TIME) & (SHAKING.end >= TIME)]

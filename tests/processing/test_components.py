@@ -1,13 +1,20 @@
+"""Components of a station: structures, instruments, directions, pairs of horizontals."""
+
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
-from obspy import Stream, Trace, UTCDateTime
+from numpy.testing import assert_allclose, assert_array_equal
+from obspy import Stream, Trace, UTCDateTime, read
 
+from per_obspy.config import Processing
+from per_obspy.processing.chain import process_instruments, process_station
 from per_obspy.processing.components import (
+    at_one_interval,
+    in_structure,
     instruments,
     is_horizontal,
     orient,
     paired,
+    split_structures,
     tell_apart,
 )
 
@@ -215,3 +222,107 @@ def test_components_of_another_rate_over_the_same_time_are_not_wrong():
     accepted, rejected = paired(map(orient, stream), OVERLAP)
     assert [part.stats.channel for part in accepted] == ["HNE", "HNZ"]
     assert "sampled every 0.02 s, its partner" in rejected[0].reasons[0]
+
+
+def film(channel, dt, seconds=20.0, digitised=True):
+    times = dt * np.arange(round(seconds / dt))
+    header = {"channel": channel, "delta": dt, "units": "m/s2"}
+    return Trace(np.sin(times), header | ({"digitised": True} if digitised else {}))
+
+
+def test_horizontals_of_film_whose_intervals_differ_by_parts_in_100_000_are_a_pair():
+    stream = map(orient, Stream([film("HNN", 0.01), film("HNE", 0.01 * (1 + 4e-5))]))
+    kept, rejected = paired(stream, 0.8)
+    assert rejected == ()
+    assert [trace.stats.delta for trace in kept] == [0.01, 0.01]
+    assert len({trace.stats.npts for trace in kept}) == 1
+    # Linear interpolation of sin(t) is at most dt^2 / 8 = 1.25e-5 off
+    for trace in kept:
+        assert_allclose(trace.data, np.sin(trace.times()), rtol=0, atol=1.3e-5)
+    notes = [line for trace in kept for line in trace.stats.get("processing", [])]
+    assert len(notes) == 1
+    assert "film interpolated from 0.0100004 s to 0.01 s" in notes[0]
+
+
+def test_other_records_whose_intervals_differ_are_no_pair():
+    stream = [film("HNN", 0.01, digitised=False), film("HNE", 0.0100004, digitised=False)]
+    _, rejected = paired(map(orient, Stream(stream)), 0.8)
+    assert len(rejected) == 1
+    assert "sampled every" in rejected[0].reasons[0]
+
+
+def test_film_that_is_interpolated_stays_unchanged():
+    stream = Stream([film("HNN", 0.01), film("HNE", 0.02), film("HNZ", 0.03, digitised=False)])
+    before = [trace.copy() for trace in stream]
+    result = at_one_interval(stream)
+    assert [trace.stats.delta for trace in result] == [0.01, 0.01, 0.03]
+    for trace, old in zip(stream, before, strict=True):
+        assert_array_equal(trace.data, old.data)
+        assert trace.stats == old.stats
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "Roof: Center",
+        "1st Floor",
+        "Bsmt",
+        "ABUTMENT 1",
+        "DECK NEAR SOUTH ABUTMENT",
+        "Pier 3, pile cap",
+    ],
+)
+def test_words_of_structures_are_recognised(place):
+    # would catch a search that minds the case of the letters
+    assert in_structure(Trace(header={"sensor_location": place}))
+
+
+@pytest.mark.parametrize(
+    "place", ["FREEFIELD", "Free-field near dam", "Ground", "Benton", "Damascus", ""]
+)
+def test_the_ground_is_not_a_structure(place):
+    # "Benton" would catch a search inside words, "near dam" one that forgets that free field has
+    # the last word
+    assert not in_structure(Trace(header={"sensor_location": place}))
+
+
+def test_a_station_named_after_a_bridge_is_not_a_structure():
+    assert not in_structure(Trace(header={"station_name": "HAYWARD - BRIDGE DECK"}))
+
+
+def test_every_trace_is_on_one_side():
+    stream = Stream(
+        [Trace(np.arange(3.0), {"sensor_location": place}) for place in ("Roof", "Ground", "Deck")]
+    )
+    ground, structure = split_structures(stream)
+    assert [trace.stats.sensor_location for trace in ground] == ["Ground"]
+    assert [trace.stats.sensor_location for trace in structure] == ["Roof", "Deck"]
+
+
+@pytest.mark.real_data
+def test_the_free_field_of_a_bridge_is_used_and_the_bridge_kept_separate(real_data):
+    folder = real_data / "spectra_v3" / "tomsplace2006"
+    stream = Stream()
+    for number in range(1, 10):
+        stream += read(str(folder / f"CHAN00{number}.V2"))
+    # three of nine channels recorded the ground
+    best, rejected = process_station(stream, Processing())
+    assert [trace.stats.sensor_location for trace in best] == ["FREEFIELD"] * 3
+    assert len(rejected) == 6
+    assert all("in a structure (" in row.reasons[0] for row in rejected)
+    # the others are processed on request
+    _, structure = split_structures(stream)
+    processed, unfit = process_instruments(structure, Processing())
+    assert sum(map(len, processed)) + len(unfit) == 6
+
+
+@pytest.mark.real_data
+def test_a_bridge_without_a_free_field_sensor_gives_no_ground_motion(real_data):
+    folder = real_data / "spectra_v3" / "hayward_20210426"
+    stream = Stream()
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() == ".v2":
+            stream += read(str(path))
+    best, rejected = process_station(stream, Processing())
+    assert not best
+    assert len(rejected) == len(stream) == 5

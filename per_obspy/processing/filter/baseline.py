@@ -56,23 +56,10 @@ def without_mean(trace: Trace, pre_event: float = 0.0) -> Trace:
     return with_note(trace, step, trace.data - mean, mean=mean, mean_of=source)
 
 
-def without_trend(trace: Trace, order: int = 1) -> Trace:
-    """
-    Return a copy without its least-squares polynomial trend, fitted to the whole record.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-    order : int
-        Of the polynomial; 1 is a straight line.
-
-    Returns
-    -------
-    obspy Trace
-    """
-    samples = series.without_trend(trace.data, order)
-    step = f"polynomial trend of order {order} removed"
-    return with_note(trace, step, samples, trend_order=order)
+def without_line(trace: Trace) -> Trace:
+    """Return a copy without its least-squares straight line, fitted to the whole record."""
+    samples = series.without_line(trace.data)
+    return with_note(trace, "polynomial trend of order 1 removed", samples, trend_order=1)
 
 
 def without_baseline(trace: Trace, remove: Callable[..., FloatArray], **options: float) -> Trace:

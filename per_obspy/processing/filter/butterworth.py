@@ -7,12 +7,13 @@ The pads stay: the filtered motion leaks into them.
 from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 from obspy import Trace
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from per_obspy.checks import FloatArray, finite, number, positive
 from per_obspy.processing.account import copy_header, with_note
-from per_obspy.processing.series import blocks, forget_plans
+from per_obspy.processing.series import blocks, forget_plans, is_long
 
 #: Length of each pad in periods of the corner per order of the filter (Boore 2005).
 PAD = 0.75
@@ -77,6 +78,56 @@ def pad(trace: Trace, highpass: float, order: int) -> Trace:
     out = with_note(trace, step, np.pad(trace.data, (before, after)), **pads)
     out.stats.starttime -= before * dt
     return out
+
+
+def thin_spectrum(
+    signals: FloatArray, dt: float, highpass: float, order: int, thin: int
+) -> tuple[FloatArray, NDArray[np.complex128], int, int]:
+    """
+    Return the low frequencies of signals with zero pads: those of a grid with fewer points.
+
+    A long record is transformed as the sum of its interleaved parts, each turned by its delay: at
+    the low frequencies alone that takes a tenth of the memory.
+
+    Parameters
+    ----------
+    signals : (..., n_samples) ndarray
+    dt : float
+        Sampling interval, s.
+    highpass, order
+        Of the filter to come, Hz, which decide the length of the pads; a corner of 0 needs none.
+    thin : int
+        Samples of the record for each point of the grid.
+
+    Returns
+    -------
+    frequencies : (n_frequencies,) ndarray
+        Hz.
+    spectrum : (..., n_frequencies) ndarray
+        Its inverse transform has fewer points by the factor of thinning.
+    points, pad : int
+        Number of points of the grid, and of those in the pad before the record.
+    """
+    # Pads and signals on a grid that is thinner by a whole number
+    samples = signals.shape[-1]
+    pad = int(np.ceil(PAD * order / highpass / dt / thin)) if highpass else 0
+    points = next_fast_len(int(np.ceil(samples / thin)) + 2 * pad, real=True)
+    padded = np.zeros((*signals.shape[:-1], points * thin))
+    padded[..., pad * thin : pad * thin + samples] = signals
+    # The low frequencies alone: a view would hold all of them
+    frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1].copy()
+    spectrum = _low_frequencies(padded, frequencies.size, thin if is_long(samples) else 1)
+    return frequencies, spectrum / thin, points, pad
+
+
+def _low_frequencies(signals: FloatArray, count: int, parts: int) -> NDArray[np.complex128]:
+    """Return the first lines of spectra, as the sum of interleaved parts turned by their delays."""
+    # One part of ordinary records
+    spectrum: NDArray[np.complex128] = rfft(signals[..., ::parts])[..., :count]
+    turn = -2j * np.pi / signals.shape[-1] * np.arange(count)
+    for first in range(1, parts):
+        spectrum = spectrum + rfft(signals[..., first::parts])[..., :count] * np.exp(first * turn)
+    return spectrum
 
 
 def butterworth_amplitude(

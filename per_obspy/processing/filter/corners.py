@@ -29,8 +29,8 @@ from per_obspy.processing.filter.baseline import (
     residual_velocity,
     velocity_residual,
     without_baseline,
+    without_line,
     without_mean,
-    without_trend,
 )
 from per_obspy.processing.filter.baseline_spread import (
     Shaking,
@@ -90,7 +90,7 @@ def choose_corners(trace: Trace, settings: Processing, fallback: Callable[[], Co
     if is_quiet:
         residual = residual_velocity(plain.data, plain.stats.delta, shaking.end)
         plain = with_numbers(plain, residual_velocity=residual)
-    level = without_trend(plain)
+    level = without_line(plain)
     # Corners by noise, then the baseline and the high-pass corner by displacement
     level, lowest, lowpass = _limits(level, settings, fallback)
     if settings.highpass is not None:

@@ -4,13 +4,11 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.fft import irfft
 from scipy.optimize import brentq
 
 from per_obspy.checks import FloatArray
-from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
-from per_obspy.processing.series import is_long
+from per_obspy.processing.filter.butterworth import butterworth_amplitude, thin_spectrum
 
 #: Order of the polynomial that is the drift.
 POLYNOMIAL_ORDER = 5
@@ -58,13 +56,12 @@ def displacement_drift(
     it): the criterion and its target; the polynomial of fifth order and the search from above are
     choices of this package.
     """
-    # Pads and record on a grid that is thinner by a whole number
+    # Spectrum of the displacement before the filter, on a grid thinner by a whole number
     thin = max(int(0.5 / (FASTEST * dt)), 1)
-    side = thin * int(np.ceil(PAD * order / lowest / dt / thin))
-    points = next_fast_len(int(np.ceil((acceleration.size + 2 * side) / thin)), real=True)
-    first, count = side // thin, acceleration.size // thin
-    # Spectrum of the displacement before the filter
-    frequencies, spectrum = _displacement_spectrum(acceleration, dt, side, thin * points, thin)
+    frequencies, spectrum, points, first = thin_spectrum(acceleration, dt, lowest, order, thin)
+    angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
+    spectrum /= -(angular**2)
+    count = acceleration.size // thin
     basis = _polynomial_basis(count)
 
     def drift(highpass: float) -> float:
@@ -76,29 +73,6 @@ def displacement_drift(
         return float(np.abs(basis @ (basis.T @ record)).max() / largest) if largest > 0 else 0.0
 
     return drift
-
-
-def _displacement_spectrum(
-    acceleration: FloatArray, dt: float, side: int, length: int, thin: int
-) -> tuple[FloatArray, NDArray[np.complex128]]:
-    """
-    Return frequencies, Hz, and spectrum of the displacement of a padded record.
-
-    A long record is transformed as the sum of its interleaved parts, each turned by its delay: at
-    the low frequencies alone that takes a tenth of the memory.
-    """
-    points = length // thin
-    # The low frequencies alone: a view would hold all of them
-    frequencies = rfftfreq(length, dt)[: points // 2 + 1].copy()
-    angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
-    padded = np.pad(acceleration, (side, length - acceleration.size - side))
-    parts = thin if is_long(acceleration.size) else 1
-    spectrum = np.zeros(frequencies.size, dtype=np.complex128)
-    for first in range(parts):
-        part = rfft(padded[first::parts])[: frequencies.size]
-        spectrum += part * np.exp(-2j * np.pi * first / length * np.arange(frequencies.size))
-    # The inverse transform has fewer points by the factor of thinning
-    return frequencies, -spectrum / (angular**2 * thin)
 
 
 @lru_cache(maxsize=4)

@@ -1,16 +1,20 @@
-"""What no ground motion can be: peaks, and components that contradict each other."""
+"""What no ground motion can be: peaks, contradicting components, motion without rest."""
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.config import Check, Checks, Processing
 from per_obspy.processing.account import Findings
 from per_obspy.processing.chain import process_station
 from per_obspy.processing.motion_checks import (
+    AT_REST,
     acceleration_findings,
     check_velocity,
     component_findings,
+    final_findings,
+    integrate,
 )
 
 RATE = 100.0
@@ -228,3 +232,43 @@ def test_another_rate_than_that_of_the_metadata_is_a_warning(components, rate, i
     accepted, _ = process_station(components(channel_rate=rate), Processing())
     flags = [one.stats.per_obspy.get("record_flags", "") for one in accepted]
     assert ("implausible_record" in flags[0]) is is_flagged
+
+
+DT = 0.01
+
+
+def acceleration(samples):
+    return Trace(
+        np.asarray(samples, dtype=float), {"delta": DT, "quantity": "acceleration", "units": "m/s2"}
+    )
+
+
+def test_a_constant_acceleration_gives_a_line_and_a_parabola():
+    given = acceleration(np.full(101, 3.0))
+    velocity = integrate(given)
+    displacement = integrate(velocity)
+    # the trapezoidal rule is exact for a constant, and for a line
+    time = np.arange(101) * DT
+    assert_allclose(velocity.data, 3 * time, rtol=1e-12)
+    assert_allclose(displacement.data, 1.5 * time**2, rtol=1e-12)
+    assert (displacement.stats.quantity, displacement.stats.units) == ("displacement", "m")
+    assert (given.stats.quantity, given.stats.units) == ("acceleration", "m/s2")
+
+
+def test_a_motion_that_comes_to_rest_is_fine():
+    time = np.arange(1001) * DT
+    rest = np.gradient(np.gradient(np.exp(-((time - 5) ** 2)), DT), DT)
+    assert final_findings(acceleration(rest), Checks()) == []
+
+
+def test_a_motion_that_goes_on_is_found_with_its_figures():
+    found = [
+        finding
+        for finding in final_findings(acceleration(np.ones(1000)), Checks())
+        if finding.check in AT_REST
+    ]
+    assert [(finding.check, finding.level) for finding in found] == [
+        ("final_velocity", "reject"),
+        ("final_displacement", "reject"),
+    ]
+    assert "over its peak: 1, allowed 0.1" in found[0].reason

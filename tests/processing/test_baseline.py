@@ -1,6 +1,9 @@
+"""Baselines: means and lines, and those that shift during the shaking."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from obspy import Trace
 from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.processing.filter.baseline import (
@@ -8,7 +11,50 @@ from per_obspy.processing.filter.baseline import (
     crossing_time,
     displacement_polynomial,
     velocity_residual,
+    without_line,
+    without_mean,
 )
+
+
+def component(samples, dt=0.01):
+    return Trace(np.asarray(samples, dtype=float), {"delta": dt, "channel": "HNE"})
+
+
+def test_the_mean_of_the_quiet_beginning_goes():
+    # mutation: the mean of the whole record leaves -5 in the quiet beginning
+    samples = np.r_[np.full(200, 3.0), np.full(200, 13.0)]
+    out = without_mean(component(samples), pre_event=2.0)
+    assert_allclose(out.data, samples - 3.0)
+    assert out.stats.per_obspy.mean == 3.0
+
+
+def test_without_a_quiet_beginning_the_mean_of_the_record_goes():
+    assert_allclose(without_mean(component([1.0, 2.0, 6.0])).data, [-2.0, -1.0, 3.0])
+
+
+def test_a_line_vanishes_and_a_parabola_does_not():
+    time = np.linspace(0, 1, 5000)
+    out = without_line(component(time))
+    assert_allclose(out.data, 0.0, atol=1e-12)  # rounding of a least-squares fit of numbers near 1
+    assert np.abs(without_line(component(time**2)).data).max() > 1e-4
+
+
+def test_inputs_stay_unchanged():
+    given = component(np.arange(10.0))
+    before = given.copy()
+    without_mean(given)
+    without_line(given)
+    assert given == before
+
+
+def test_the_line_is_that_of_an_orthogonal_decomposition():
+    # would catch sums that lose digits
+    samples = 1e6 + np.linspace(0, 1e3, 20_000) ** 2 + np.random.default_rng(2).normal(size=20_000)
+    place = np.linspace(-1, 1, samples.size)
+    expected = np.polynomial.Polynomial.fit(place, samples, 1)(place)
+    # both round at 1e-16 of the largest sample
+    assert_allclose(samples - without_line(component(samples)).data, expected, rtol=1e-12)
+
 
 DT, ONSET, END = 0.01, 20.0, 50.0
 
