@@ -17,6 +17,7 @@ from per_obspy.errors import Rejection
 from per_obspy.processing.account import (
     CLIPPED,
     SILENT_HEADER,
+    copy_header,
     is_processed,
     judge,
     lenient,
@@ -25,7 +26,6 @@ from per_obspy.processing.account import (
     taken,
     with_flags,
     with_note,
-    with_numbers,
 )
 from per_obspy.processing.components import is_horizontal, paired
 from per_obspy.processing.earthquake import Corner, Source, fallback_highpass
@@ -163,7 +163,7 @@ def _filter(trace: Trace, settings: Processing) -> Trace:
         if not (settings.permanent_offset and finding.check == "final_displacement")
     ]
     # A second pass keeps a processed record with its corners
-    trace = with_numbers(judge(trace, findings))
+    trace = copy_header(judge(trace, findings))
     trace.stats.processing_level, trace.stats.corners = "processed", corners
     return with_flags(trace)
 

@@ -21,9 +21,9 @@ from per_obspy.processing.series import blocks, forget_plans
 from per_obspy.spectra.trace_arguments import unit_after_steps
 from per_obspy.units import unit_of_si
 
-#: The pre-filter of velocity sensors rises from 0 to 1 in this band, Hz; that of accelerometers
+#: Unit of the sensor -> band in which the pre-filter rises from 0 to 1, Hz; that of accelerometers
 #: leaves low frequencies unchanged.
-VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
+LOW_BANDS = {"m/s": (0.005, 0.01), "m/s2": (-2.0, -1.0)}
 
 #: The pre-filter falls from 1 to 0 in this band, fractions of the Nyquist frequency: above it
 #: recorders record no motion, and dividing by a response near zero makes noise.
@@ -244,15 +244,20 @@ def _convert(trace: Trace, tolerance: float) -> Trace:
     unit, response, findings = _response_of_sensor(trace, response)
     trace = judge(trace, findings)
     if any(type(stage) is not ResponseStage for stage in response.response_stages):
-        _require_flat(trace, response)
-        return _deconvolve(trace, response, ACCELERATION_BAND if unit == "m/s2" else VELOCITY_BAND)
+        if unit == "m/s":
+            _require_flat(trace, response)
+        return _deconvolve(trace, response, LOW_BANDS[unit])
     if unit != "m/s2":
         raise RecordRejected(
             trace.id, "a velocity sensor with an overall sensitivity but no response stages"
         )
     sensitivity = response.instrument_sensitivity.value
-    step = f"divided by sensitivity {sensitivity:g} counts/(m/s2)"
-    return with_note(trace, step, trace.data / sensitivity, conversion="sensitivity")
+    return with_note(
+        trace,
+        f"divided by sensitivity {sensitivity:g} counts/(m/s2)",
+        trace.data / sensitivity,
+        conversion="sensitivity",
+    )
 
 
 def with_overall_sensitivity(response: Response) -> Response:
@@ -323,24 +328,18 @@ def _require_consistent(trace: Trace, response: Response, tolerance: float) -> N
 
 def _require_flat(trace: Trace, response: Response) -> None:
     """Reject an accelerometer, by its code, whose response is that of a velocity sensor."""
-    units = str(response.instrument_sensitivity.input_units)
-    motion = unit_of_si(units)
-    is_velocity = motion is not None and motion.quantity == "velocity"
-    is_doubtful = is_velocity and ACCELEROMETER.fullmatch(trace.stats.channel)
+    if not ACCELEROMETER.fullmatch(trace.stats.channel):
+        return
     try:
-        low, high = (
-            np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
-            if is_doubtful
-            else (1.0, 1.0)
-        )
+        low, high = np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
     except (ValueError, NotImplementedError, ArithmeticError):
         return  # refused when it is removed
     if low > FLAT * high:
-        ends = f"from {FLAT_BAND[0]:g} to {FLAT_BAND[1]:g} Hz"
+        units, ends = response.instrument_sensitivity.input_units, "from {:g} to {:g} Hz"
         raise RecordRejected(
             trace.id,
             f"response from {units} of an accelerometer: its response to acceleration falls "
-            f"{low / high:.2g} times {ends} (M/S in place of M/S**2?)",
+            f"{low / high:.2g} times {ends.format(*FLAT_BAND)} (M/S in place of M/S**2?)",
         )
 
 
