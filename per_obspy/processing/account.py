@@ -20,7 +20,7 @@ from per_obspy.errors import RecordRejected, Rejection
 
 Value = str | float | int
 
-#: Reasons of recorders that reached a limit begin with this word: see :mod:`.instrument`.
+#: Reasons of recorders that reached a limit begin with this word: see :mod:`.chain`.
 CLIPPED = "clipped"
 
 #: Check -> what its figure is, where that must be no less than the limit.

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.peer_at2 import is_at2, read_at2, write_at2
-from per_obspy.processing.instrument import pass_through
+from per_obspy.processing.chain import pass_through
 
 NAMED = """PEER NGA STRONG MOTION DATABASE RECORD
 Kern County, 7/21/1952, Taft Lincoln School, 21

@@ -21,8 +21,8 @@ from per_obspy.processing.account import (
     with_flags,
     with_note,
 )
+from per_obspy.processing.chain import pass_through
 from per_obspy.processing.earthquake import fallback_highpass
-from per_obspy.processing.instrument import pass_through
 from per_obspy.screening.columns import RECORD_FLAGS
 
 

@@ -4,7 +4,7 @@ from numpy.polynomial import Polynomial
 from obspy import Trace
 
 from per_obspy.processing.filter.butterworth import bandpass, pad, taper
-from per_obspy.processing.filter.displacement_drift import clean_highpass, displacement_drift
+from per_obspy.processing.filter.corners import clean_highpass, displacement_drift
 from per_obspy.processing.motion_checks import integrate
 
 DT = 0.01

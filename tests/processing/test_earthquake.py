@@ -8,8 +8,8 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
 from per_obspy.config import Processing
+from per_obspy.processing.chain import process_instrument
 from per_obspy.processing.earthquake import Source, same_decisions
-from per_obspy.processing.instrument import process_instrument
 
 SETTINGS = Processing()
 START = UTCDateTime(2020, 1, 1)

@@ -7,10 +7,15 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
 from per_obspy.config import Processing
-from per_obspy.processing.chain import process, process_instruments, process_station
+from per_obspy.processing.chain import (
+    pass_through,
+    process,
+    process_instrument,
+    process_instruments,
+    process_station,
+)
 from per_obspy.processing.earthquake import Source
 from per_obspy.processing.filter.butterworth import acausal_bandpass
-from per_obspy.processing.instrument import pass_through, process_instrument
 from per_obspy.processing.motion_checks import integrate
 
 START = UTCDateTime(2020, 1, 1)
