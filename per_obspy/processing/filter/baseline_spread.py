@@ -168,7 +168,7 @@ def _filtered(signals: FloatArray, dt: float, highpass: float, order: int) -> Fl
     spectrum *= butterworth_amplitude(frequencies, highpass, np.inf, order)
     # The ends of long pads move none of the oscillators
     unused = max(pad - round(LONGEST_PAD / (thin * dt)), 0)
-    return np.asarray(irfft(spectrum, points)[:, unused : points - unused])
+    return np.asarray(irfft(spectrum, points)[:, unused : points - unused] / thin)
 
 
 def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> FloatArray:

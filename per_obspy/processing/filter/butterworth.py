@@ -104,7 +104,7 @@ def thin_spectrum(
     frequencies : (n_frequencies,) ndarray
         Hz.
     spectrum : (..., n_frequencies) ndarray
-        Its inverse transform has fewer points by the factor of thinning.
+        To be divided by the factor of thinning: its inverse transform has fewer points.
     points, pad : int
         Number of points of the grid, and of those in the pad before the record.
     """
@@ -117,16 +117,16 @@ def thin_spectrum(
     # The low frequencies alone: a view would hold all of them
     frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1].copy()
     spectrum = _low_frequencies(padded, frequencies.size, thin if is_long(samples) else 1)
-    return frequencies, spectrum / thin, points, pad
+    return frequencies, spectrum, points, pad
 
 
 def _low_frequencies(signals: FloatArray, count: int, parts: int) -> NDArray[np.complex128]:
     """Return the first lines of spectra, as the sum of interleaved parts turned by their delays."""
     # One part of ordinary records
     spectrum: NDArray[np.complex128] = rfft(signals[..., ::parts])[..., :count]
-    turn = -2j * np.pi / signals.shape[-1] * np.arange(count)
     for first in range(1, parts):
-        spectrum = spectrum + rfft(signals[..., first::parts])[..., :count] * np.exp(first * turn)
+        turn = np.exp(-2j * np.pi * first / signals.shape[-1] * np.arange(count))
+        spectrum = spectrum + rfft(signals[..., first::parts])[..., :count] * turn
     return spectrum
 
 

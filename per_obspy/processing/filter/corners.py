@@ -346,7 +346,7 @@ def displacement_drift(
     thin = max(int(0.5 / (FASTEST * dt)), 1)
     frequencies, spectrum, points, first = thin_spectrum(acceleration, dt, lowest, order, thin)
     angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
-    spectrum /= -(angular**2)
+    spectrum = -spectrum / (angular**2 * thin)
     count = acceleration.size // thin
     basis = _polynomial_basis(count)
 
