@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from per_obspy.processing.filter.baseline import boore_segments
 from per_obspy.processing.filter.baseline_spread import Shaking, without_drift
-from per_obspy.processing.filter.velocity import boore_segments
 
 Array = NDArray[np.float64]
 

@@ -21,12 +21,12 @@ from obspy import Stream, Trace
 from per_obspy import per_spectrum
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
+from per_obspy.processing.account import is_processed
 from per_obspy.processing.chain import process
+from per_obspy.processing.components import is_horizontal, orient
 from per_obspy.processing.filter.baseline_spread import Shaking, without_drift
 from per_obspy.processing.instrument_response import in_acceleration
-from per_obspy.processing.noise.signal_to_noise import significant_samples
-from per_obspy.processing.notes import is_processed
-from per_obspy.processing.station.components import is_horizontal, oriented
+from per_obspy.processing.series import significant_samples
 from per_obspy.records.folder import find_stations, read_station
 
 #: Periods at which PER is compared, s.
@@ -78,9 +78,9 @@ def horizontals(folder: Path) -> Iterator[Trace]:
     for name, files in found.stations.items():
         stream, _ = read_station(files, found.inventory, name)
         raw = Stream([trace for trace in stream if not is_processed(trace)])
-        for trace in oriented(raw):
+        for trace in map(orient, raw):
             if is_horizontal(trace):
-                yield in_acceleration(Stream([trace]), SETTINGS.gain_tolerance)[0]
+                yield in_acceleration(trace, SETTINGS.gain_tolerance)
 
 
 def cases(trace: Trace, smallest: float, starts: Iterator[float]) -> Iterator[Case]:

@@ -1,13 +1,9 @@
 """Settings of the processing chain, and of the grid of the spectra."""
 
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import (
-    Field,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, field_validator, model_validator
 
 from per_obspy.config.section import Section
 from per_obspy.constants import (
@@ -29,180 +25,143 @@ class Check(Section):
     )
 
 
-class Checks(Section):
-    """Thresholds of the record checks (``processing/quality``, ``processing/filter/corners``)."""
+def _check(threshold: float, level: str, description: str) -> Any:
+    """Return the key of a check with its default limit and level."""
+    return Field(Check(threshold=threshold, level=level), description=description)
 
-    sampling_rate: Check = Field(
-        Check(threshold=20.0, level="reject"), description="smallest sampling rate, Hz"
+
+class Checks(Section):
+    """Thresholds of the record checks (``processing/account.py`` has their words)."""
+
+    sampling_rate: Check = _check(20.0, "reject", "smallest sampling rate, Hz")
+    sampling_interval: Check = _check(
+        0.2,
+        "reject",
+        "longest sampling interval of any record, s: longer ones hold no strong motion",
     )
-    sampling_interval: Check = Field(
-        Check(threshold=0.2, level="reject"),
-        description="longest sampling interval of any record, s: longer ones hold no strong motion",
+    channel_rate: Check = _check(
+        0.01,
+        "warn",
+        "largest relative difference between the sampling rates of record and metadata",
     )
-    channel_rate: Check = Field(
-        Check(threshold=0.01, level="warn"),
-        description="largest relative difference between the sampling rates of record and metadata",
+    duration: Check = _check(5.0, "reject", "shortest duration, s")
+    levels: Check = _check(16, "reject", "smallest number of different values of the samples")
+    clipped_run: Check = _check(
+        5, "reject", "number of equal samples at an extreme from which a record is clipped"
     )
-    duration: Check = Field(
-        Check(threshold=5.0, level="reject"), description="shortest duration, s"
+    pinned: Check = _check(
+        3,
+        "reject",
+        "number of samples equal to an extreme, of a record that does not repeat other "
+        "values, from which it is clipped",
     )
-    levels: Check = Field(
-        Check(threshold=16, level="reject"),
-        description="smallest number of different values of the samples",
+    saturation: Check = _check(
+        2.0,
+        "reject",
+        "largest ratio of samples within 5 % of an extreme to those 5 to 15 % below it, at "
+        "several flat excursions",
     )
-    clipped_run: Check = Field(
-        Check(threshold=5, level="reject"),
-        description="number of equal samples at an extreme from which a record is clipped",
+    possible_saturation: Check = _check(
+        1.0, "warn", "the same ratio, from which a record may be clipped"
     )
-    pinned: Check = Field(
-        Check(threshold=3, level="reject"),
-        description=(
-            "number of samples equal to an extreme, of a record that does not repeat other values, "
-            "from which it is clipped"
-        ),
+    wrapped: Check = _check(
+        0.4,
+        "reject",
+        "smallest roughness that is left where steps across the range are turned back as "
+        "overflows of the counter, relative to the roughness before",
     )
-    saturation: Check = Field(
-        Check(threshold=2.0, level="reject"),
-        description=(
-            "largest ratio of samples within 5 % of an extreme to those 5 to 15 % below it, at "
-            "several flat excursions"
-        ),
+    counter_use: Check = _check(
+        0.8, "warn", "largest peak relative to the full scale of a 24-bit counter"
     )
-    possible_saturation: Check = Field(
-        Check(threshold=1.0, level="warn"),
-        description="the same ratio, from which a record may be clipped",
+    dropout: Check = _check(
+        0.5, "reject", "duration without a change during the shaking that means missing samples, s"
     )
-    wrapped: Check = Field(
-        Check(threshold=0.4, level="reject"),
-        description=(
-            "smallest roughness that is left where steps across the range are turned back as "
-            "overflows of the counter, relative to the roughness before"
-        ),
+    filled: Check = _check(
+        0.09,
+        "reject",
+        "longest time during the shaking whose samples are equal or on a straight line, as in"
+        " a gap that was filled, if other such times are 4 times shorter, s",
     )
-    counter_use: Check = Field(
-        Check(threshold=0.8, level="warn"),
-        description="largest peak relative to the full scale of a 24-bit counter",
+    spike: Check = _check(
+        6.0, "reject", "largest ratio of the jump of one sample to the others within 0.5 s"
     )
-    dropout: Check = Field(
-        Check(threshold=0.5, level="reject"),
-        description="duration without a change during the shaking that means missing samples, s",
+    zero_crossings: Check = _check(0.1, "reject", "smallest number of zero crossings per second")
+    header_peak: Check = _check(
+        0.01, "warn", "largest relative difference between the peaks of header and samples"
     )
-    filled: Check = Field(
-        Check(threshold=0.09, level="reject"),
-        description=(
-            "longest time during the shaking whose samples are equal or on a straight line, as in "
-            "a gap that was filled, if other such times are 4 times shorter, s"
-        ),
+    outlier: Check = _check(
+        5.0, "reject", "largest ratio of a peak to the largest peak of two other components"
     )
-    spike: Check = Field(
-        Check(threshold=6.0, level="reject"),
-        description="largest ratio of the jump of one sample to the others within 0.5 s",
+    weak_component: Check = _check(
+        5.0,
+        "reject",
+        "largest ratio of the peaks of two horizontals (4 times as much to the vertical), "
+        "from which the smaller one is left out",
     )
-    zero_crossings: Check = Field(
-        Check(threshold=0.1, level="reject"),
-        description="smallest number of zero crossings per second",
+    copied_component: Check = _check(
+        0.999,
+        "reject",
+        "largest correlation of two components: beyond it one is a copy of the other",
     )
-    header_peak: Check = Field(
-        Check(threshold=0.01, level="warn"),
-        description="largest relative difference between the peaks of header and samples",
+    late_component: Check = _check(
+        1.0, "reject", "largest time between the envelopes of two horizontals, s"
     )
-    outlier: Check = Field(
-        Check(threshold=5.0, level="reject"),
-        description="largest ratio of a peak to the largest peak of two other components",
+    exchanged_component: Check = _check(
+        0.4,
+        "warn",
+        "largest logarithm of the share of early motion (P waves) of a horizontal over that "
+        "of the vertical and that of the other horizontal",
     )
-    weak_component: Check = Field(
-        Check(threshold=5.0, level="reject"),
-        description=(
-            "largest ratio of the peaks of two horizontals (4 times as much to the vertical), from "
-            "which the smaller one is left out"
-        ),
+    unusual_acceleration: Check = _check(
+        43.0,
+        "warn",
+        "largest peak acceleration, m/s2: the largest one recorded is 42.8 (vector of three "
+        "components, IWTH25, Iwate-Miyagi 2008)",
     )
-    copied_component: Check = Field(
-        Check(threshold=0.999, level="reject"),
-        description="largest correlation of two components: beyond it one is a copy of the other",
+    impossible_acceleration: Check = _check(
+        86.0, "reject", "largest possible peak acceleration, m/s2: twice the largest one recorded"
     )
-    late_component: Check = Field(
-        Check(threshold=1.0, level="reject"),
-        description="largest time between the envelopes of two horizontals, s",
+    unusual_velocity: Check = _check(
+        3.2,
+        "warn",
+        "largest peak velocity, m/s: the largest one recorded is 3.18 (Chi-Chi 1999; Anderson"
+        " 2010, BSSA 100, 1-36)",
     )
-    exchanged_component: Check = Field(
-        Check(threshold=0.4, level="warn"),
-        description=(
-            "largest logarithm of the share of early motion (P waves) of a horizontal over that of "
-            "the vertical and that of the other horizontal"
-        ),
+    impossible_velocity: Check = _check(
+        6.4, "reject", "largest possible peak velocity, m/s: twice the largest one recorded"
     )
-    unusual_acceleration: Check = Field(
-        Check(threshold=43.0, level="warn"),
-        description=(
-            "largest peak acceleration, m/s2: the largest one recorded is 42.8 (vector of three "
-            "components, IWTH25, Iwate-Miyagi 2008)"
-        ),
+    weak_motion: Check = _check(
+        1e-4,
+        "warn",
+        "smallest peak acceleration, m/s2: weaker motion is a tenth of what people feel, or "
+        "in another unit",
     )
-    impossible_acceleration: Check = Field(
-        Check(threshold=86.0, level="reject"),
-        description="largest possible peak acceleration, m/s2: twice the largest one recorded",
+    velocity_time: Check = _check(
+        3.0,
+        "reject",
+        "largest ratio of peak velocity to peak acceleration, s (below 1 s on the lake bed of"
+        " Mexico City): beyond it the sampling interval is wrong",
     )
-    unusual_velocity: Check = Field(
-        Check(threshold=3.2, level="warn"),
-        description=(
-            "largest peak velocity, m/s: the largest one recorded is 3.18 (Chi-Chi 1999; Anderson "
-            "2010, BSSA 100, 1-36)"
-        ),
+    late_trigger: Check = _check(
+        0.1, "warn", "largest ratio of the motion of the first second to the peak"
     )
-    impossible_velocity: Check = Field(
-        Check(threshold=6.4, level="reject"),
-        description="largest possible peak velocity, m/s: twice the largest one recorded",
+    cut_off: Check = _check(
+        0.1, "warn", "largest ratio of the motion of the last second to the peak"
     )
-    weak_motion: Check = Field(
-        Check(threshold=1e-4, level="warn"),
-        description=(
-            "smallest peak acceleration, m/s2: weaker motion is a tenth of what people feel, or in "
-            "another unit"
-        ),
+    second_event: Check = _check(
+        0.3, "warn", "largest ratio of a later peak after a quiet interval to the peak"
     )
-    velocity_time: Check = Field(
-        Check(threshold=3.0, level="reject"),
-        description=(
-            "largest ratio of peak velocity to peak acceleration, s (below 1 s on the lake bed of "
-            "Mexico City): beyond it the sampling interval is wrong"
-        ),
+    signal_to_noise: Check = _check(
+        2.0, "reject", "smallest signal-to-noise ratio at the best frequency"
     )
-    late_trigger: Check = Field(
-        Check(threshold=0.1, level="warn"),
-        description="largest ratio of the motion of the first second to the peak",
+    clear_band: Check = _check(2.0, "warn", "smallest signal-to-noise ratio over required_band")
+    bandwidth: Check = _check(4.0, "reject", "smallest ratio of low-pass to high-pass corner")
+    final_velocity: Check = _check(0.1, "reject", "largest ratio of the final velocity to its peak")
+    final_displacement: Check = _check(
+        0.2, "reject", "largest ratio of the final displacement to its peak"
     )
-    cut_off: Check = Field(
-        Check(threshold=0.1, level="warn"),
-        description="largest ratio of the motion of the last second to the peak",
-    )
-    second_event: Check = Field(
-        Check(threshold=0.3, level="warn"),
-        description="largest ratio of a later peak after a quiet interval to the peak",
-    )
-    signal_to_noise: Check = Field(
-        Check(threshold=2.0, level="reject"),
-        description="smallest signal-to-noise ratio at the best frequency",
-    )
-    clear_band: Check = Field(
-        Check(threshold=2.0, level="warn"),
-        description="smallest signal-to-noise ratio over required_band",
-    )
-    bandwidth: Check = Field(
-        Check(threshold=4.0, level="reject"),
-        description="smallest ratio of low-pass to high-pass corner",
-    )
-    final_velocity: Check = Field(
-        Check(threshold=0.1, level="reject"),
-        description="largest ratio of the final velocity to its peak",
-    )
-    final_displacement: Check = Field(
-        Check(threshold=0.2, level="reject"),
-        description="largest ratio of the final displacement to its peak",
-    )
-    baseline_shift: Check = Field(
-        Check(threshold=0.5, level="warn"),
-        description="largest ratio of the lasting velocity before the filter to the peak velocity",
+    baseline_shift: Check = _check(
+        0.5, "warn", "largest ratio of the lasting velocity before the filter to the peak velocity"
     )
 
 

@@ -30,8 +30,8 @@ from per_obspy.jobs.event_facts import (
 )
 from per_obspy.jobs.parallel import Work, results
 from per_obspy.machine import raise_machine_fault
+from per_obspy.processing.account import taken
 from per_obspy.processing.chain import process_station
-from per_obspy.processing.notes import taken
 from per_obspy.records.event_file import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
@@ -42,7 +42,7 @@ from per_obspy.spectra.storage import read_spectra, without_motion, write_spectr
 if TYPE_CHECKING:
     from obspy import Inventory, Stream
 
-    from per_obspy.processing.noise.windows import Source
+    from per_obspy.processing.earthquake import Source
 
 #: Suffix of a station file with spectra.
 SPECTRA = ".nc"

@@ -14,11 +14,10 @@ from per_obspy.files import remove_dead_parts, remove_file
 from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
-from per_obspy.processing.chain import process_instruments, process_station
-from per_obspy.processing.noise.windows import Source
-from per_obspy.processing.notes import taken
-from per_obspy.processing.station.structures import kept_apart
-from per_obspy.processing.unprocessed import before_processing
+from per_obspy.processing.account import taken
+from per_obspy.processing.chain import before_processing, process_instruments, process_station
+from per_obspy.processing.components import split_structures
+from per_obspy.processing.earthquake import Source
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
@@ -128,7 +127,7 @@ def _structure(job: StationJob) -> Path:
 
 def records_shard(job: StationJob, stream: Stream, source: Source | None) -> Products:
     """Write the processed records of a station as its station file, structures in another file."""
-    ground, structure = kept_apart(taken(stream))
+    ground, structure = split_structures(taken(stream))
     clean, unfit = process_station(chain(taken(ground), structure), job.processing, source)
     return _write_records(job, clean, unfit, _write_structure(job, structure, source))
 
@@ -141,7 +140,7 @@ def drawn_records_shard(job: StationJob, stream: Stream, source: Source | None) 
     if clean:
         traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
         draw_records(traces, pages)
-    _, structure = kept_apart(stream)
+    _, structure = split_structures(stream)
     products = _write_records(job, clean, unfit, _write_structure(job, structure, source))
     return products._replace(files=(*products.files, pages)) if clean else products
 

@@ -1,25 +1,65 @@
-"""The processing chain, station by station, with a reason for every rejected trace."""
+"""
+The processing chain: stations, their instruments, the steps of an instrument in their order.
+
+Checks, m/s2, noise, baseline, corners, filter, usable periods; a reason for every rejected trace.
+Records processed by others pass with the corners of their header.
+"""
 
 import logging
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import filterfalse
 
 from obspy import Stream, Trace
+from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.noise.windows import Source, source_of
-from per_obspy.processing.notes import rejection, taken
-from per_obspy.processing.station.components import (
+from per_obspy.processing.account import (
+    CLIPPED,
+    SILENT_HEADER,
+    copy_header,
+    is_processed,
+    judge,
+    lenient,
+    rejection,
+    survivors,
+    taken,
+    with_flags,
+    with_note,
+)
+from per_obspy.processing.components import (
     instruments,
     is_horizontal,
-    oriented,
-    told_apart,
+    orient,
+    paired,
+    split_structures,
+    tell_apart,
 )
-from per_obspy.processing.station.merging import merged
-from per_obspy.processing.station.structures import kept_apart
+from per_obspy.processing.earthquake import Corner, Source, fallback_highpass, source_of
+from per_obspy.processing.filter.baseline import without_mean
+from per_obspy.processing.filter.butterworth import bandpass, pad, taper
+from per_obspy.processing.filter.corners import (
+    LOWPASS_OF_NYQUIST,
+    choose_corners,
+    clean_corner,
+    keep_offset,
+    lowest_highpass,
+    share_corners,
+    with_usable_periods,
+)
+from per_obspy.processing.instrument_response import in_acceleration
+from per_obspy.processing.merging import merged
+from per_obspy.processing.motion_checks import (
+    AT_REST,
+    acceleration_findings,
+    component_findings,
+    final_findings,
+)
+from per_obspy.processing.noise_window import noise_windows, trim
+from per_obspy.processing.raw_checks import final_sample_findings, raw_findings
 
 #: Settings of an empty configuration.
 DEFAULTS = Processing()
@@ -89,7 +129,7 @@ def process_station(
     Parameters
     ----------
     stream : iterable of obspy Trace
-        All channels of one station, unchanged by it. From :func:`.notes.taken`, so that no other
+        All channels of one station, unchanged by it. From :func:`.account.taken`, so that no other
         code holds them, raw records leave memory on the way.
     settings : Processing
         Every number of the chain.
@@ -104,10 +144,15 @@ def process_station(
         One row per trace; a bad trace is rejected alone. Sensors in structures are among them: they
         recorded the structure, not the ground; `process_instruments` processes them.
     """
-    ground, structure = kept_apart(stream)
+    ground, structure = split_structures(stream)
     candidates, unusable = process_instruments(taken(ground), settings, event)
-    best = max(candidates, key=_components, default=Stream())
     rejected = list(unusable)
+
+    # Horizontals first, then all components
+    def components(traces: Stream) -> tuple[int, int]:
+        return sum(map(is_horizontal, traces)), len(traces)
+
+    best = max(candidates, key=components, default=Stream())
     # Other instruments at the same place
     for traces in candidates:
         if traces is not best:
@@ -123,11 +168,6 @@ def process_station(
         reason = f"in a structure ({trace.stats.sensor_location}): kept apart"
         rejected.append(rejection(trace, reason))
     return best, tuple(rejected)
-
-
-def _components(traces: Stream) -> tuple[int, int]:
-    """Return the number of horizontals of an instrument, and of all its components."""
-    return sum(map(is_horizontal, traces)), len(traces)
 
 
 def process_instruments(
@@ -151,17 +191,234 @@ def process_instruments(
     rejected : tuple of Rejection
     """
     whole, broken = merged(stream)
-    source = source_of(event) if isinstance(event, Event) and event.origins else None
-    if isinstance(event, Source):
-        source = event
+    source = event if isinstance(event, Source) else None
+    if isinstance(event, Event) and event.origins:
+        source = source_of(event)
     processed, rejected = [], list(broken)
     # Each instrument by itself
     for instrument in instruments(taken(whole)):
-        components, unclear = told_apart(instrument)
+        components, unclear = tell_apart(instrument)
         # Each component has one owner, and leaves memory when it is done
         instrument.clear()
-        directed = oriented(taken(components))
-        traces, unusable = process_instrument(taken(directed), settings, source)
+        directed = map(orient, taken(components))
+        traces, unusable = process_instrument(directed, settings, source)
         processed += [traces] if traces else []
         rejected += (*unclear, *unusable)
     return processed, tuple(rejected)
+
+
+def process_instrument(
+    instrument: Iterable[Trace], settings: Processing, source: Source | None
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """
+    Process the components of one instrument and return a row for each that is left out.
+
+    Every step is done for one component at a time, and each leaves memory when its next form is
+    there, if no other code holds it.
+
+    Parameters
+    ----------
+    instrument : iterable of obspy Trace
+        Whole, oriented traces, all raw or all processed by others.
+    settings : Processing
+        Every number of the chain.
+    source : Source or None
+        The event, if known.
+
+    Returns
+    -------
+    processed : obspy Stream
+    rejected : tuple of Rejection
+    """
+    components = Stream(list(instrument))
+    is_final = bool(components) and is_processed(components[0])
+    pair, unusable = _physical_pair(components, settings, is_final)
+    if is_final:
+        passing = _judged_step(pair, settings, partial(pass_through, settings=settings))
+        passed, unfit = survivors(passing, taken(pair))
+        return passed, (*unusable, *unfit)
+    # All components around the shaking
+    for trace in taken(noise_windows(taken(pair), settings, source)):
+        pair += trim(trace, settings.longest_noise, settings.longest_signal)
+    # Baseline and corners of each component; the horizontals share the narrower band
+    step = _judged_step(pair, settings, _corner_step(pair, settings, source))
+    ready, undecided = survivors(step, taken(pair))
+    verticals = Stream(list(filterfalse(is_horizontal, ready)))
+    ready = share_corners(filter(is_horizontal, taken(ready))) + verticals
+    verticals.clear()
+    done, restless = survivors(partial(_filter, settings=settings), taken(ready))
+    return done, (*unusable, *undecided, *restless)
+
+
+def _physical_pair(
+    components: Stream, settings: Processing, is_final: bool
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """Return the components in m/s2, the horizontals over their common time; empty the input."""
+
+    def convert(trace: Trace) -> Trace:
+        if not is_final:
+            trace = judge(trace, raw_findings(trace, settings.checks))
+        # Series of velocity or displacement are no acceleration
+        trace = in_acceleration(trace, settings.gain_tolerance)
+        return judge(trace, acceleration_findings(trace, settings.checks))
+
+    physical, unfit = survivors(convert, taken(components))
+    # Sensor and recorder are one: what one component lost at their limit, others lost as well
+    clipped = [
+        row.name for row in unfit if any(reason.startswith(CLIPPED) for reason in row.reasons)
+    ]
+    if clipped:
+        reason = f"{CLIPPED}: {', '.join(clipped)} of the same instrument"
+        return Stream(), (*unfit, *(rejection(trace, reason) for trace in physical))
+    pair, unpaired = paired(taken(physical), settings.overlap)
+    return pair, (*unfit, *unpaired)
+
+
+def _judged_step(
+    pair: Stream, settings: Processing, step: Callable[[Trace], Trace]
+) -> Callable[[Trace], Trace]:
+    """Return a step that first judges each component by the others."""
+    findings = component_findings(pair, settings.checks)
+    return lambda trace: step(judge(trace, findings.get(trace.id, ())))
+
+
+def _corner_step(
+    pair: Stream, settings: Processing, source: Source | None
+) -> Callable[[Trace], Trace]:
+    """Return the step that chooses baseline and corners."""
+    # The permanent offset is kept on request only
+    if settings.permanent_offset:
+        return partial(keep_offset, settings=settings)
+    # The first magnitude in the headers, where there is no event
+    magnitudes = [trace.stats.get("event", {}).get("magnitude") for trace in pair]
+    in_header = next((float(magnitude) for magnitude in magnitudes if magnitude), None)
+    magnitude = source.magnitude if source else in_header
+
+    def fallback() -> Corner:
+        corner = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
+        if source is not None:
+            source.note(highpass=list(corner))
+        return corner
+
+    return partial(choose_corners, settings=settings, fallback=fallback)
+
+
+def _filter(trace: Trace, settings: Processing) -> Trace:
+    """Return the filtered record with usable periods and flags, marked as processed."""
+    chosen, order = trace.stats.per_obspy, settings.order
+    corners = AttribDict(highpass=chosen.highpass, lowpass=chosen.lowpass)
+    if settings.permanent_offset:
+        trace = bandpass(trace, 0.0, corners.lowpass, order)
+    else:
+        padded = pad(trace, corners.highpass, order)
+        trace = bandpass(padded, corners.highpass, corners.lowpass, order)
+        del padded
+    trace = with_usable_periods(trace, settings.usable)
+    findings = [
+        finding
+        for finding in final_findings(trace, settings.checks)
+        if not (settings.permanent_offset and finding.check == "final_displacement")
+    ]
+    # A second pass keeps a processed record with its corners
+    trace = copy_header(judge(trace, findings))
+    trace.stats.processing_level, trace.stats.corners = "processed", corners
+    return with_flags(trace)
+
+
+def pass_through(trace: Trace, settings: Processing) -> Trace:
+    """
+    Return a copy of a record processed by others, with its corners and usable periods.
+
+    Without a high-pass corner in the header, the corner that would clean the displacement limits
+    the usable periods (no filter is applied); without a low-pass corner, 0.75 of the Nyquist
+    frequency. Velocity or displacement that does not come to rest, and a peak that is not the
+    header's, are warnings: the samples are final. What no ground motion can be is rejected as in
+    raw records.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+        Acceleration, m/s2.
+    settings : Processing
+        Every number of the chain.
+
+    Returns
+    -------
+    obspy Trace
+
+    Raises
+    ------
+    RecordRejected
+        If a check rejects, with every reason.
+    """
+    header = trace.stats.get("corners", {})
+    if header.get("highpass"):
+        highpass = Corner(header["highpass"], "header")
+    else:
+        highpass = _limiting_highpass(trace, settings)
+    # Corners like 999 Hz mean none
+    nyquist = trace.stats.sampling_rate / 2
+    lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, f"0.75 Nyquist, {SILENT_HEADER}")
+    if 0 < header.get("lowpass", 0) < nyquist:
+        lowpass = Corner(header["lowpass"], "header")
+    out = with_note(
+        trace,
+        "processed already, passed through",
+        highpass=float(highpass.frequency),
+        highpass_source=highpass.reason,
+        lowpass=float(lowpass.frequency),
+        lowpass_source=lowpass.reason,
+    )
+    findings = final_sample_findings(trace, settings.checks)
+    # Their corners are no choice of this program
+    findings += final_findings(trace, lenient(settings.checks, AT_REST))
+    return with_flags(with_usable_periods(judge(out, findings), settings.usable))
+
+
+def _limiting_highpass(trace: Trace, settings: Processing) -> Corner:
+    """Return the corner below which the displacement is not clean, as a limit of usable periods."""
+    highest = settings.highpass_range[1]
+    shape = taper(trace, settings.taper)
+    clean = clean_corner(shape, lowest_highpass(trace), highest, settings)
+    if clean is None:
+        return Corner(highest, f"displacement drifts at any corner, {SILENT_HEADER}")
+    return Corner(clean.frequency, f"{clean.reason}, {SILENT_HEADER}")
+
+
+def before_processing(stream: Stream, processed: Trace, settings: Processing) -> Trace | None:
+    """
+    Return the raw record of a processed trace in m/s2 over the processed time.
+
+    Only the mean of its noise is removed.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        All channels of the station as read.
+    processed : obspy Trace
+        From `process_station`.
+    settings : Processing
+        Settings of that processing.
+
+    Returns
+    -------
+    obspy Trace or None
+        None if the record came processed by others.
+    """
+    whole, _ = merged(
+        trace for trace in stream if trace.id == processed.id and not is_processed(trace)
+    )
+    if not whole:
+        return None
+    physical = in_acceleration(whole[0], settings.gain_tolerance)
+    # Start of the processed record without its pads, s and samples after that of the raw one
+    chosen, dt = processed.stats.per_obspy, processed.stats.delta
+    before = round(float(chosen.get("pad_before", 0.0)) / dt)
+    after = round(float(chosen.get("pad_after", 0.0)) / dt)
+    start = processed.stats.starttime + before * dt - physical.stats.starttime
+    first = max(round(start / physical.stats.delta), 0)
+    # The samples between the pads
+    count = processed.stats.npts - (before + after)
+    physical.data = physical.data[first : first + count]
+    physical.stats.starttime += first * physical.stats.delta
+    return without_mean(physical, float(chosen.noise))

@@ -1,12 +1,12 @@
 """Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy, deepcopy
 
 import numpy as np
 from numpy.typing import NDArray
-from obspy import Stream, Trace
+from obspy import Trace
 from obspy.core.inventory import Response
 from obspy.core.inventory.response import InstrumentSensitivity, ResponseStage
 from obspy.signal.invsim import cosine_sac_taper
@@ -16,15 +16,14 @@ from scipy.interpolate import CubicSpline
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, SEED_CODE
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.long_records import blocks, forget_plans
-from per_obspy.processing.notes import copied, copied_trace, noted
-from per_obspy.processing.quality.findings import Finding, judged
+from per_obspy.processing.account import Finding, judge, with_note
+from per_obspy.processing.series import blocks, forget_plans
 from per_obspy.spectra.trace_arguments import unit_after_steps
 from per_obspy.units import unit_of_si
 
-#: The pre-filter of velocity sensors rises from 0 to 1 in this band, Hz; that of accelerometers
+#: Unit of the sensor -> band in which the pre-filter rises from 0 to 1, Hz; that of accelerometers
 #: leaves low frequencies unchanged.
-VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
+LOW_BANDS = {"m/s": (0.005, 0.01), "m/s2": (-2.0, -1.0)}
 
 #: The pre-filter falls from 1 to 0 in this band, fractions of the Nyquist frequency: above it
 #: recorders record no motion, and dividing by a response near zero makes noise.
@@ -81,10 +80,10 @@ def as_recorded(trace: Trace) -> Trace:
         raise RecordRejected(trace.id, f"units {unit}, needs m/s2 or counts with a response")
     if unit in (None, "counts"):
         unit, reason = _unit_by_samples(trace)
-    if unit in (None, trace.stats.get("units", "counts")):
+    if unit is None or unit == trace.stats.get("units", "counts"):
         return trace
     # The header is that of the samples as they are
-    out = copied_trace(trace)
+    out = with_note(trace, f"in {unit} already, by {reason}", conversion=reason)
     # Response, factor and peak describe counts, which these samples are not
     out.stats.pop("response", None)
     if trace.stats.get("units", "counts") == "counts":
@@ -92,7 +91,6 @@ def as_recorded(trace: Trace) -> Trace:
     out.stats.calib, out.stats.units = 1.0, unit
     if motion := unit_of_si(unit):
         out.stats.quantity = motion.quantity
-    noted(out, f"in {unit} already, by {reason}", conversion=reason)
     return out
 
 
@@ -107,9 +105,9 @@ def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
     header_peak = _header_peak(trace)
     for step, (unit, factor) in units.items():
         # The peak of the header is that of counts or of motion; a part of the record has less
-        if _near(peaks, header_peak):
+        if _are_near(peaks, header_peak):
             return None, ""
-        if _near(peaks, header_peak * factor):
+        if _are_near(peaks, header_peak * factor):
             return unit, f"{step}, as the header's peak shows"
         most = PEAK_FACTOR * header_peak * factor or LARGEST_MOTION
         if peaks[1] < most and _are_whole(samples, 1 / factor):
@@ -119,11 +117,10 @@ def _unit_by_samples(trace: Trace) -> tuple[str | None, str]:
     return None, ""
 
 
-def _near(peaks: list[float], header_peak: float) -> bool:
+def _are_near(peaks: list[float], expected: float) -> bool:
     """Return whether a peak, with or without the mean, is about that of the header, if any."""
-    return header_peak > 0 and any(
-        1 / PEAK_FACTOR < peak / header_peak < PEAK_FACTOR for peak in peaks
-    )
+    ratios = [peak / expected for peak in peaks if expected > 0]
+    return any(1 / PEAK_FACTOR < ratio < PEAK_FACTOR for ratio in ratios)
 
 
 def _refuse_physical(trace: Trace, peaks: list[float], unit: str, factor: float) -> None:
@@ -139,18 +136,21 @@ def _refuse_physical(trace: Trace, peaks: list[float], unit: str, factor: float)
 
 def _physical_units(trace: Trace) -> dict[str, tuple[str, float]]:
     """Return what may have been applied to counts -> unit of the result, and unit per count."""
-    stats = trace.stats
-    units = {}
-    # ObsPy's K-NET reader gives m/s2 without naming the quantity
+    # The reader's factor, and the response
+    stats, units = trace.stats, {}
     if stats.calib not in (0.0, 1.0):
-        is_acceleration = stats.get("quantity") == "acceleration" or "knet" in stats
-        unit = "m/s2" if is_acceleration else "counts times calib"
+        unit = "m/s2" if _gives_acceleration(trace) else "counts times calib"
         units["apply_calib"] = (unit, abs(float(stats.calib)))
     sensitivity = getattr(stats.get("response"), "instrument_sensitivity", None)
     motion = unit_of_si(getattr(sensitivity, "input_units", ""))
     if sensitivity and motion and sensitivity.value:
         units["remove_sensitivity"] = (motion.name, 1 / abs(float(sensitivity.value)))
     return units
+
+
+def _gives_acceleration(trace: Trace) -> bool:
+    """Return whether ``calib`` gives m/s2: ObsPy's K-NET reader does not name the quantity."""
+    return trace.stats.get("quantity") == "acceleration" or "knet" in trace.stats
 
 
 def _header_peak(trace: Trace) -> float:
@@ -183,26 +183,25 @@ def _are_whole(samples: FloatArray, factor: float) -> bool:
     return bool(np.count_nonzero(nearest) >= FEWEST_STEPS and is_near.mean() >= MOSTLY_WHOLE)
 
 
-def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
+def in_acceleration(trace: Trace, gain_tolerance: float) -> Trace:
     """
-    Return a copy in m/s2.
+    Return a copy in m/s2; a record that is physical already stays as it is.
 
-    Physical records pass through. Counts are deconvolved with the full response where the metadata
-    have one, without a water level, which would distort accelerometers; the pre-filter does not
-    change accelerometers at low frequency, where their response is flat. Without stages the overall
-    sensitivity divides; without any response the factor ``calib`` multiplies, if the reader gives
-    ``quantity = "acceleration"``.
+    Counts are deconvolved with the full response where the metadata have one, without a water
+    level, which would distort accelerometers; the pre-filter does not change accelerometers at low
+    frequency, where their response is flat. Without stages the overall sensitivity divides; without
+    any response the factor ``calib`` multiplies, if the reader gives ``quantity = "acceleration"``.
 
     Parameters
     ----------
-    stream : obspy Stream
+    trace : obspy Trace
     gain_tolerance : float
         Largest relative difference between the product of the stage gains and the overall
         sensitivity.
 
     Returns
     -------
-    obspy Stream
+    obspy Trace
 
     Raises
     ------
@@ -213,43 +212,52 @@ def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
     ----------
     Havskov & Alguacil 2016, Instrumentation in Earthquake Seismology, chapter 6.
     """
-    out = copied(stream)
-    for trace in out:
-        units = trace.stats.get("units", "counts")
-        if units == "counts":
-            _convert(trace, gain_tolerance)
-        elif units != "m/s2":
-            problem = f"units {units!r}, needs m/s2 or counts with a response"
-            if units == "m/s":
-                problem += "; remove_response with output='ACC', or differentiate"
-            raise RecordRejected(trace.id, problem)
+    units = trace.stats.get("units", "counts")
+    if units == "m/s2":
+        return trace
+    if units != "counts":
+        problem = f"units {units!r}, needs m/s2 or counts with a response"
+        if units == "m/s":
+            problem += "; remove_response with output='ACC', or differentiate"
+        raise RecordRejected(trace.id, problem)
+    out = _convert(trace, gain_tolerance)
+    # The response describes counts, which these samples no longer are
+    out.stats.pop("response", None)
+    out.stats.calib, out.stats.units, out.stats.quantity = 1.0, "m/s2", "acceleration"
     return out
 
 
-def _convert(trace: Trace, tolerance: float) -> None:
-    """Convert the copy of a step from counts to m/s2."""
+def _convert(trace: Trace, tolerance: float) -> Trace:
+    """Return a copy of counts with samples in m/s2, by what the metadata have."""
+    # The full response, its value at one frequency, or the factor of the reader
     response = trace.stats.get("response")
     if response is not None:
         response = with_overall_sensitivity(response)
     if response is None or response.instrument_sensitivity is None:
-        _multiply_calibration(trace)
-    else:
-        _require_consistent(trace, response, tolerance)
-        unit, response = _response_of_sensor(trace, response)
-        if any(type(stage) is not ResponseStage for stage in response.response_stages):
+        calib = trace.stats.calib
+        if not _gives_acceleration(trace) or calib == 1.0:
+            raise RecordRejected(trace.id, "counts without a response or a calibration factor")
+        step = f"multiplied by calib {calib:g} m/s2"
+        return with_note(trace, step, trace.data * calib, conversion="calibration factor")
+    # One that does not contradict itself
+    _require_consistent(trace, response, tolerance)
+    unit, response, findings = _response_of_sensor(trace, response)
+    trace = judge(trace, findings)
+    if any(type(stage) is not ResponseStage for stage in response.response_stages):
+        if unit == "m/s":
             _require_flat(trace, response)
-            band = ACCELERATION_BAND if unit == "m/s2" else VELOCITY_BAND
-            _deconvolve(trace, response, band)
-        elif unit == "m/s2":
-            _divide_sensitivity(trace, response)
-        else:
-            raise RecordRejected(
-                trace.id, "a velocity sensor with an overall sensitivity but no response stages"
-            )
-    # The response describes counts, which these samples no longer are
-    trace.stats.pop("response", None)
-    trace.stats.calib = 1.0
-    trace.stats.units, trace.stats.quantity = "m/s2", "acceleration"
+        return _deconvolve(trace, response, LOW_BANDS[unit])
+    if unit != "m/s2":
+        raise RecordRejected(
+            trace.id, "a velocity sensor with an overall sensitivity but no response stages"
+        )
+    sensitivity = response.instrument_sensitivity.value
+    return with_note(
+        trace,
+        f"divided by sensitivity {sensitivity:g} counts/(m/s2)",
+        trace.data / sensitivity,
+        conversion="sensitivity",
+    )
 
 
 def with_overall_sensitivity(response: Response) -> Response:
@@ -274,9 +282,11 @@ def with_overall_sensitivity(response: Response) -> Response:
     return out
 
 
-def _response_of_sensor(trace: Trace, response: Response) -> tuple[str, Response]:
+def _response_of_sensor(
+    trace: Trace, response: Response
+) -> tuple[str, Response, Iterable[Finding]]:
     """
-    Return the unit of ground motion of a response, and the response with that unit.
+    Return the unit of ground motion of a response, the response with that unit, and warnings.
 
     Instrument code N is an accelerometer. Where StationXML names M/S for it and its poles and zeros
     pass a constant motion, the name is wrong: a sensor of velocity has no such response, as it
@@ -289,34 +299,17 @@ def _response_of_sensor(trace: Trace, response: Response) -> tuple[str, Response
         raise RecordRejected(trace.id, f"response from {name!r}, needs M/S**2 or M/S")
     channel = trace.stats.channel.upper()
     if unit == "m/s2" or not (re.fullmatch(SEED_CODE, channel) and channel[1] == "N"):
-        return unit, response
+        return unit, response, ()
     # The first stage with zeros is the sensor
     sensor = next((one for one in response.response_stages if hasattr(one, "zeros")), None)
     if sensor is None or any(abs(zero) < AT_ZERO for zero in sensor.zeros):
-        _warned(trace, f"response from {name!r}, but instrument code N is an accelerometer")
-        return unit, response
+        text = f"response from {name!r}, but instrument code N is an accelerometer"
+        return unit, response, [Finding("response_units", "warn", text)]
     # Samples and stages stay, the unit is the other one
     text = f"response from {name!r}, but an accelerometer (code N) flat to zero frequency"
-    _warned(trace, f"{text}: taken as M/S**2")
     out = deepcopy(response)
     out.instrument_sensitivity.input_units = out.response_stages[0].input_units = "M/S**2"
-    return "m/s2", out
-
-
-def _warned(trace: Trace, reason: str) -> None:
-    """Add a warning to the copy of a step."""
-    [judged_trace] = judged(trace, [Finding("response_units", "warn", reason)])
-    trace.stats.per_obspy = judged_trace.stats.per_obspy
-
-
-def _multiply_calibration(trace: Trace) -> None:
-    """Multiply by the reader's factor, if it is one to acceleration."""
-    # ObsPy's K-NET reader gives m/s2 without naming the quantity
-    is_known = trace.stats.get("quantity") == "acceleration" or "knet" in trace.stats
-    if not is_known or trace.stats.calib == 1.0:
-        raise RecordRejected(trace.id, "counts without a response or a calibration factor")
-    trace.data = trace.data * trace.stats.calib
-    noted(trace, f"multiplied by calib {trace.stats.calib:g} m/s2", conversion="calibration factor")
+    return "m/s2", out, [Finding("response_units", "warn", f"{text}: taken as M/S**2")]
 
 
 def _require_consistent(trace: Trace, response: Response, tolerance: float) -> None:
@@ -335,35 +328,22 @@ def _require_consistent(trace: Trace, response: Response, tolerance: float) -> N
 
 def _require_flat(trace: Trace, response: Response) -> None:
     """Reject an accelerometer, by its code, whose response is that of a velocity sensor."""
-    units = str(response.instrument_sensitivity.input_units)
-    motion = unit_of_si(units)
-    is_velocity = motion is not None and motion.quantity == "velocity"
-    is_doubtful = is_velocity and ACCELEROMETER.fullmatch(trace.stats.channel)
+    if not ACCELEROMETER.fullmatch(trace.stats.channel):
+        return
     try:
-        low, high = (
-            np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
-            if is_doubtful
-            else (1.0, 1.0)
-        )
+        low, high = np.abs(response.get_evalresp_response_for_frequencies(FLAT_BAND, "ACC"))
     except (ValueError, NotImplementedError, ArithmeticError):
         return  # refused when it is removed
     if low > FLAT * high:
-        ends = f"from {FLAT_BAND[0]:g} to {FLAT_BAND[1]:g} Hz"
+        units, ends = response.instrument_sensitivity.input_units, "from {:g} to {:g} Hz"
         raise RecordRejected(
             trace.id,
             f"response from {units} of an accelerometer: its response to acceleration falls "
-            f"{low / high:.2g} times {ends} (M/S in place of M/S**2?)",
+            f"{low / high:.2g} times {ends.format(*FLAT_BAND)} (M/S in place of M/S**2?)",
         )
 
 
-def _divide_sensitivity(trace: Trace, response: Response) -> None:
-    """Divide by the overall sensitivity."""
-    sensitivity = response.instrument_sensitivity.value
-    trace.data = trace.data / sensitivity
-    noted(trace, f"divided by sensitivity {sensitivity:g} counts/(m/s2)", conversion="sensitivity")
-
-
-def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> None:
+def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> Trace:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
     band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up samples that the filter moves around
@@ -374,16 +354,17 @@ def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> N
         response_at = _interpolated(response, step, length // 2 * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    # Taper and response of a day would take more memory than the record: block by block
     spectrum = _padded_spectrum(trace.data, length)
+    # Taper and response of a day would take more memory than the record: block by block
     for block in blocks(0, spectrum.size):
         frequencies = step * np.arange(block.start, block.stop)
         spectrum[block] *= cosine_sac_taper(frequencies, flimit=band)
         spectrum[block] /= response_at(frequencies)
     # Back in time, without the zeros
-    trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
+    samples = irfft(spectrum, length, overwrite_x=True)[:count].copy()
     forget_plans(length)
-    noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
+    note = f"response removed, pre-filter {band} Hz"
+    return with_note(trace, note, samples, conversion="response")
 
 
 def _pre_filter(low: tuple[float, float], nyquist: float) -> tuple[float, float, float, float]:

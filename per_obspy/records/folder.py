@@ -20,7 +20,7 @@ from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Reject
 from per_obspy.files import bytes_hash
 from per_obspy.formats.text.station_table import bare_name, located_stations
 from per_obspy.machine import raise_machine_fault
-from per_obspy.processing.notes import taken
+from per_obspy.processing.account import taken
 from per_obspy.records.archive import LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.file_list import (

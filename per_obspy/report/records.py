@@ -15,7 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
 from per_obspy.files import written_whole
-from per_obspy.processing.noise.signal_to_noise import noise_spectra
+from per_obspy.processing.signal_to_noise import noise_spectra
 from per_obspy.report.style import (
     BUILDING_COLOURS,
     CORNER_COLOUR,

@@ -23,14 +23,14 @@ ROUNDS = 3
 #: step -> the functions whose time is its own, with everything they call
 STEPS = {
     "read, attach metadata": ("read_station",),
-    "merge, orient, pair": ("merged", "oriented", "paired"),
+    "merge, orient, pair": ("merged", "orient", "paired"),
     "checks of raw samples": ("raw_findings",),
     "response removal": ("in_acceleration",),
-    "first wave": ("noise_window_noted",),
-    "means and lines": ("mean_removed", "trend_removed"),
+    "first wave": ("noise_windows",),
+    "means and lines": ("without_mean", "without_line"),
     "noise spectra": ("measured_noise",),
     "corner by displacement": ("_clean_baseline",),
-    "pad and filter": ("padded", "filtered"),
+    "pad and filter": ("pad", "bandpass"),
     "final checks": ("final_findings",),
 }
 

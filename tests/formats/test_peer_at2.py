@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.peer_at2 import read_at2, write_at2
-from per_obspy.processing.already_processed import passed_through
+from per_obspy.processing.chain import pass_through
 
 NAMED = """PEER NGA STRONG MOTION DATABASE RECORD
 Kern County, 7/21/1952, Taft Lincoln School, 21
@@ -92,7 +92,7 @@ def test_corners_in_the_line_of_sizes(line_end: str, corners: dict):
 def test_corners_of_a_real_record(real_data: Path):
     trace = obspy.read(real_data / "records" / "peer_at2" / "RSN15_KERN_TAF021.AT2")[0]
     assert trace.stats.corners == {"highpass": 0.1, "lowpass": 13.9}
-    passed = passed_through(obspy.Stream([trace]), Processing())[0].stats.per_obspy
+    passed = pass_through(trace, Processing()).stats.per_obspy
     assert_allclose(passed.longest_period, 0.8 / 0.1, rtol=1e-12)
 
 
@@ -122,11 +122,11 @@ def test_the_corner_of_the_header_sets_the_longest_usable_period(words: str):
     stream = obspy.Stream([read("\n".join(header + body))])
     settings = Processing()
     # 0.8 / HP (Boore and others): 10 s
-    longest = passed_through(stream, settings)[0].stats.per_obspy.longest_period
+    longest = pass_through(stream[0], settings).stats.per_obspy.longest_period
     assert_allclose(longest, 10.0, rtol=1e-12)
     # Without it the displacement decides
     del stream[0].stats.corners["highpass"]
-    assert passed_through(stream, settings)[0].stats.per_obspy.longest_period < 5.0
+    assert pass_through(stream[0], settings).stats.per_obspy.longest_period < 5.0
 
 
 @pytest.mark.parametrize(

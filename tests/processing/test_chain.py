@@ -1,4 +1,4 @@
-"""The chain over whole stations: laws of the result, choice of instruments, rejected traces."""
+"""Whole stations: laws of the result, choice of instruments, the raw record beside it."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Checks, Processing
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.chain import process, process_station
+from per_obspy.processing.chain import before_processing, process, process_station
 from per_obspy.processing.instrument_response import in_acceleration
 
 RATE, COUNT = 100.0, 6000
@@ -210,7 +210,7 @@ def ridgecrest(real_data):
 @pytest.mark.parametrize("station", ["CCC", "WNM"])
 def test_the_response_is_removed_as_obspy_removes_it(ridgecrest, station):
     trace = ridgecrest.select(station=station, channel="HNE")[0]
-    found = in_acceleration(Stream([trace]), 0.1)[0].data
+    found = in_acceleration(trace, 0.1).data
     expected = trace.copy()
     expected.data = expected.data - expected.data.mean()
     expected.remove_response(
@@ -233,3 +233,55 @@ def test_ridgecrest_gives_sane_motion_at_all_stations(ridgecrest):
         # a filtered record ends at rest: the pads hold 1.5 n periods of the corner
         assert abs(velocity[-1]) < 1e-3 * np.abs(velocity).max()
         assert abs(displacement[-1]) < 0.01 * np.abs(displacement).max()
+
+
+START = UTCDateTime(2020, 1, 1)
+
+
+def recorded(samples, channel="HNE", **stats):
+    noise = 1e-4 * np.random.default_rng(3).normal(size=samples.size)
+    header = {"sampling_rate": 100.0, "channel": channel, "units": "m/s2", "starttime": START}
+    return Trace(samples + noise, header | stats)
+
+
+@pytest.mark.parametrize(
+    "settings", [SETTINGS, Processing(longest_noise=10.0, longest_signal=50.0)]
+)
+def test_it_covers_the_processed_time_without_the_pads(earthquake, settings):
+    # would catch a start that is wrong by the pad or by the seconds that were cut
+    trace = recorded(earthquake() + 0.3)
+    processed = process_station(Stream([trace]), settings)[0][0]
+    chosen = processed.stats.per_obspy
+    before = before_processing(Stream([trace]), processed, settings)
+    assert before.stats.starttime - processed.stats.starttime == pytest.approx(chosen.pad_before)
+    assert processed.stats.endtime - before.stats.endtime == pytest.approx(chosen.pad_after)
+    # the same samples, without the mean of the noise
+    first = round((before.stats.starttime - START) * 100)
+    same = trace.data[first : first + before.stats.npts]
+    quiet = same[: round(chosen.noise * 100)].mean()
+    assert_allclose(before.data, same - quiet, atol=1e-12)
+
+
+def test_the_mean_is_that_of_the_noise(earthquake):
+    trace = recorded(earthquake() + 0.3)
+    processed = process_station(Stream([trace]), SETTINGS)[0][0]
+    before = before_processing(Stream([trace]), processed, SETTINGS)
+    assert abs(before.data[:1500].mean()) < 1e-5
+
+
+def test_another_channel_is_not_it_and_a_record_processed_by_others_has_none(earthquake):
+    trace = recorded(earthquake())
+    processed = process_station(Stream([trace]), SETTINGS)[0][0]
+    others = Stream(
+        [recorded(earthquake(2), "HNN"), recorded(earthquake(), processing_level="processed")]
+    )
+    assert before_processing(others, processed, SETTINGS) is None
+    assert before_processing(others + trace, processed, SETTINGS) is not None
+
+
+def test_the_raw_record_stays_unchanged(earthquake):
+    stream = Stream([recorded(earthquake())])
+    processed = process_station(stream, SETTINGS)[0][0]
+    earlier = stream.copy(), processed.copy()
+    before_processing(stream, processed, SETTINGS)
+    assert (stream, processed) == earlier

@@ -4,7 +4,7 @@ import numpy as np
 import obspy
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from obspy import Stream, Trace
+from obspy import Trace
 from obspy.core.inventory import Response
 from obspy.core.inventory.response import (
     InstrumentSensitivity,
@@ -57,12 +57,12 @@ def counts(samples, **stats):
         "sampling_rate": RATE,
         "units": "counts",
     }
-    return Stream([Trace(samples, header | stats)])
+    return Trace(samples, header | stats)
 
 
 def test_a_flat_accelerometer_is_divided_by_its_gain():
     acceleration, _ = motion()
-    out = in_acceleration(counts(GAIN * acceleration + 500.0, response=response()), TOLERANCE)[0]
+    out = in_acceleration(counts(GAIN * acceleration + 500.0, response=response()), TOLERANCE)
     # the pre-filter starts at 40 Hz, far above the pulse: rounding of the transform remains
     assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
     assert (out.stats.units, out.stats.quantity) == ("m/s2", "acceleration")
@@ -79,7 +79,7 @@ def test_a_velocity_sensor_gives_acceleration():
     recorded = np.fft.irfft(np.fft.rfft(velocity) * sensor, velocity.size)
     out = in_acceleration(
         counts(GAIN * recorded, response=response("M/S"), channel="HHE"), TOLERANCE
-    )[0]
+    )
     # np.gradient is off by (2 pi f dt)^2 / 6: 0.07 % at 1 Hz, 0.2 % at the pulse's upper end
     assert_allclose(out.data, acceleration, atol=2e-3 * acceleration.max())
 
@@ -97,25 +97,25 @@ def test_an_accelerometer_may_be_described_by_velocity():
     flat.response_stages[0].zeros, flat.response_stages[0].poles = [0j], [-6283.0 + 0j]
     acceleration, _ = motion()
     given = counts(GAIN * acceleration, response=flat)
-    assert in_acceleration(given, TOLERANCE)[0].stats.units == "m/s2"
+    assert in_acceleration(given, TOLERANCE).stats.units == "m/s2"
 
 
 def test_an_overall_sensitivity_divides():
     acceleration, _ = motion()
     bare = with_sensitivity(GAIN, "M/S**2", [])
-    out = in_acceleration(counts(GAIN * acceleration, response=bare), TOLERANCE)[0]
+    out = in_acceleration(counts(GAIN * acceleration, response=bare), TOLERANCE)
     assert_allclose(out.data, acceleration, rtol=1e-14)  # one multiplication and one division
 
 
 def test_physical_records_pass():
     acceleration, _ = motion()
     assert_array_equal(
-        in_acceleration(counts(acceleration, units="m/s2"), TOLERANCE)[0].data, acceleration
+        in_acceleration(counts(acceleration, units="m/s2"), TOLERANCE).data, acceleration
     )
 
 
 def test_the_factor_of_a_reader_of_acceleration_is_used():
-    out = in_acceleration(counts(np.arange(10.0), calib=0.5, quantity="acceleration"), TOLERANCE)[0]
+    out = in_acceleration(counts(np.arange(10.0), calib=0.5, quantity="acceleration"), TOLERANCE)
     assert_array_equal(out.data, np.arange(10.0) / 2)
     assert out.stats.calib == 1.0
 
@@ -146,23 +146,23 @@ def test_what_cannot_be_converted_is_a_reason(stats, reason):
 
 def test_a_gain_within_the_tolerance_is_no_reason():
     near = counts(np.arange(100.0), response=response(stages=(GAIN, 1.09)))
-    assert in_acceleration(near, TOLERANCE)
+    assert in_acceleration(near, TOLERANCE).stats.units == "m/s2"
 
 
 def test_inputs_stay_unchanged():
-    stream = counts(np.arange(100.0), response=response())
-    before = stream.copy()
-    in_acceleration(stream, TOLERANCE)
-    assert stream == before
+    trace = counts(np.arange(100.0), response=response())
+    before = trace.copy()
+    in_acceleration(trace, TOLERANCE)
+    assert trace == before
 
 
 def test_knet_records_that_obspy_read_are_converted_by_their_factor():
     # mutation: the factor of a reader without a quantity refused, or used twice
-    record = obspy.read("/path/to/test.knet")  # comes with ObsPy
+    record = obspy.read("/path/to/test.knet")[0]  # comes with ObsPy
     out = in_acceleration(record, TOLERANCE)
-    expected = abs(record[0].data).max() * record[0].stats.calib
-    assert abs(out[0].data).max() == pytest.approx(expected, rel=1e-12)
-    assert out[0].stats.units == "m/s2"
+    expected = abs(record.data).max() * record.stats.calib
+    assert abs(out.data).max() == pytest.approx(expected, rel=1e-12)
+    assert out.stats.units == "m/s2"
 
 
 def test_an_hour_of_zeros_behind_a_long_record_is_enough(monkeypatch):
@@ -172,11 +172,11 @@ def test_an_hour_of_zeros_behind_a_long_record_is_enough(monkeypatch):
         -(((np.arange(count) - 0.9 * count) / 500) ** 2)
     )
     sensor = {"response": response("M/S"), "channel": "HHE"}
-    stream = counts(GAIN * ground, sampling_rate=rate, **sensor)
+    trace = counts(GAIN * ground, sampling_rate=rate, **sensor)
     assert count / rate > LONGEST_PAD
-    found = in_acceleration(stream, TOLERANCE)[0].data
+    found = in_acceleration(trace, TOLERANCE).data
     monkeypatch.setattr(instrument_response, "LONGEST_PAD", count / rate)
-    expected = in_acceleration(stream, TOLERANCE)[0].data
+    expected = in_acceleration(trace, TOLERANCE).data
     # The tail of the pre-filter after an hour, which is 18 of its longest periods
     assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
 
@@ -185,13 +185,13 @@ def recorded_counts(**stats):
     """Return whole counts of noise that shakes for some seconds, with a response, ObsPy's way."""
     noise = np.convolve(np.random.default_rng(4).normal(size=4000), np.hanning(11) / 2, "same")
     samples = GAIN * noise * np.hanning(4000)
-    stream = counts(np.round(samples).astype(np.int32), response=response(), **stats)
-    del stream[0].stats.units
-    return stream
+    trace = counts(np.round(samples).astype(np.int32), response=response(), **stats)
+    del trace.stats.units
+    return trace
 
 
-def motion_of(stream):
-    return in_acceleration(Stream([as_recorded(trace) for trace in stream]), TOLERANCE)[0].data
+def motion_of(trace):
+    return in_acceleration(as_recorded(trace), TOLERANCE).data
 
 
 STEPS = {
@@ -203,11 +203,11 @@ STEPS = {
 @pytest.mark.parametrize("step", STEPS)
 def test_what_obspy_converted_is_not_converted_again(step):
     # mutation: the response that ObsPy leaves in the header divides once more
-    stream = recorded_counts().detrend("demean")
-    getattr(stream, step)(**STEPS[step])
+    trace = recorded_counts().detrend("demean")
+    getattr(trace, step)(**STEPS[step])
     # in counts beforehand: 2e5 of them are 1 m/s2
-    assert 1 < np.abs(stream[0].data).max() < 10
-    assert_array_equal(motion_of(stream), stream[0].data)
+    assert 1 < np.abs(trace.data).max() < 10
+    assert_array_equal(motion_of(trace), trace.data)
 
 
 @pytest.mark.parametrize(
@@ -216,17 +216,17 @@ def test_what_obspy_converted_is_not_converted_again(step):
 def test_steps_of_any_version_of_obspy_are_read(version, separator):
     text = f"{version}: remove_response(inventory=None{separator}output='ACC'{separator}plot=False)"
     acceleration, _ = motion()
-    stream = counts(acceleration, response=response(), processing=[text])
-    assert_array_equal(motion_of(stream), acceleration)
+    trace = counts(acceleration, response=response(), processing=[text])
+    assert_array_equal(motion_of(trace), acceleration)
 
 
 def test_velocity_that_is_differentiated_is_acceleration():
-    stream = recorded_counts().detrend("demean")
-    stream.remove_response(output="VEL", pre_filt=(0.05, 0.1, 40, 45), water_level=None)
+    trace = recorded_counts().detrend("demean")
+    trace.remove_response(output="VEL", pre_filt=(0.05, 0.1, 40, 45), water_level=None)
     with pytest.raises(RecordRejected, match=r"units 'm/s', needs .* output='ACC', or diff"):
-        motion_of(stream)
-    stream.differentiate()
-    assert_array_equal(motion_of(stream), stream[0].data)
+        motion_of(trace)
+    trace.differentiate()
+    assert_array_equal(motion_of(trace), trace.data)
 
 
 @pytest.mark.parametrize(
@@ -242,78 +242,77 @@ def test_velocity_that_is_differentiated_is_acceleration():
     ],
 )  # fmt: skip
 def test_samples_of_another_unit_are_refused_by_the_step(steps, unit):
-    stream = recorded_counts().detrend("demean")
+    trace = recorded_counts().detrend("demean")
     for step, options in steps:
-        getattr(stream, step)(**options)
+        getattr(trace, step)(**options)
     with pytest.raises(RecordRejected, match=unit):
-        motion_of(stream)
+        motion_of(trace)
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 @pytest.mark.parametrize("change", ["demean", "linear", None])
 def test_samples_without_their_steps_are_known_by_the_factor_of_whole_counts(kind, change):
     # As a file of MiniSEED or SAC has them: no list of steps
-    stream = recorded_counts()
-    stream.remove_sensitivity()
-    trace = stream[0]
+    trace = recorded_counts()
+    trace.remove_sensitivity()
     if change:
         trace.detrend(change)
     trace.data = trace.data.astype(kind)
     del trace.stats.processing
-    assert_array_equal(motion_of(stream), trace.data)
+    assert_array_equal(motion_of(trace), trace.data)
     # and counts remain counts, whole or without mean and trend
     raw = recorded_counts().detrend(change or "demean")
-    raw[0].data = raw[0].data.astype(kind)
-    assert_allclose(np.abs(motion_of(raw)).max(), np.abs(raw[0].data).max() / GAIN, rtol=1e-3)
+    raw.data = raw.data.astype(kind)
+    assert_allclose(np.abs(motion_of(raw)).max(), np.abs(raw.data).max() / GAIN, rtol=1e-3)
 
 
 @pytest.mark.parametrize("unit", [1.0, 100.0, 1 / 9.80665])
 @pytest.mark.parametrize("quantity", ["ACC", "VEL"])
 def test_samples_that_are_no_counts_are_refused_where_their_unit_is_lost(unit, quantity):
     # m/s2, gal or g of a file; mutation: divided again they are 1e-5 m/s2
-    stream = recorded_counts().detrend("demean")
-    stream.remove_response(output=quantity, pre_filt=(0.05, 0.1, 40, 45), water_level=None)
-    stream[0].data = stream[0].data * unit
-    del stream[0].stats.processing
+    trace = recorded_counts().detrend("demean")
+    trace.remove_response(output=quantity, pre_filt=(0.05, 0.1, 40, 45), water_level=None)
+    trace.data = trace.data * unit
+    del trace.stats.processing
     with pytest.raises(RecordRejected, match="samples: no whole numbers up to"):
-        motion_of(stream)
+        motion_of(trace)
 
 
 def test_filtered_counts_and_fractions_of_counts_remain_counts():
     # the overall sensitivity is a multiple of 20
-    for stream in (
+    for trace in (
         recorded_counts().filter("bandpass", freqmin=0.1, freqmax=30),
         recorded_counts(),
     ):
-        stream[0].data = stream[0].data / 20
-        expected = np.abs(stream[0].data).max() / GAIN
+        trace.data = trace.data / 20
+        expected = np.abs(trace.data).max() / GAIN
         # the window leaves 1e-4 of the noise above the 40 Hz of the pre-filter
-        assert_allclose(np.abs(motion_of(stream)).max(), expected, rtol=1e-3)
+        assert_allclose(np.abs(motion_of(trace)).max(), expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize("with_response", [False, True])
 def test_a_calibration_that_is_applied_is_not_applied_again(with_response):
     # mutation: calib stays in the header and multiplies once more, or the response divides
-    record = obspy.read("/path/to/test.knet")
-    expected = record[0].data * record[0].stats.calib
-    applied = obspy.read("/path/to/test.knet", apply_calib=True)
+    record = obspy.read("/path/to/test.knet")[0]
+    expected = record.data * record.stats.calib
+    applied = obspy.read("/path/to/test.knet", apply_calib=True)[0]
     if with_response:
-        applied[0].stats.response = response()
+        applied.stats.response = response()
     assert_allclose(motion_of(applied), expected, rtol=1e-12)
     # where the header's peak is cut off, whole counts show it
     half = applied.copy()
-    half.trim(endtime=half[0].stats.starttime + 20)
-    assert_allclose(motion_of(half), half[0].data, rtol=1e-12)
+    half.trim(endtime=half.stats.starttime + 20)
+    assert_allclose(motion_of(half), half.data, rtol=1e-12)
     # gal, by the header's peak
-    applied[0].data = 100 * applied[0].data
+    applied.data = 100 * applied.data
     with pytest.raises(RecordRejected, match=r"needs counts, or stats\.units"):
         motion_of(applied)
 
 
 def test_a_unit_that_the_user_sets_is_right():
     acceleration, _ = motion()
-    stream = counts(acceleration, response=response(), units="m/s2")
-    assert_array_equal(motion_of(stream), acceleration)
+    trace = counts(acceleration, response=response(), units="m/s2")
+    assert_array_equal(motion_of(trace), acceleration)
 
 
 @pytest.mark.parametrize("stages", [(GAIN,), (GAIN / 8, 8.0), (2.0, GAIN, 0.5)])
@@ -321,12 +320,12 @@ def test_without_an_overall_sensitivity_the_product_of_the_stages_converts(stage
     acceleration, _ = motion()
     silent = response(stages=stages)
     silent.instrument_sensitivity = None
-    out = in_acceleration(counts(GAIN * acceleration, response=silent), TOLERANCE)[0]
+    out = in_acceleration(counts(GAIN * acceleration, response=silent), TOLERANCE)
     # the pre-filter starts at 40 Hz, far above the pulse: rounding of the transform remains
     assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
     # gains alone
     gains = Response(None, None, None, [ResponseStage(1, GAIN, 1.0, "M/S**2", "COUNTS")])
-    out = in_acceleration(counts(GAIN * acceleration, response=gains), TOLERANCE)[0]
+    out = in_acceleration(counts(GAIN * acceleration, response=gains), TOLERANCE)
     assert_allclose(out.data, acceleration, rtol=1e-14)
 
 
@@ -335,7 +334,7 @@ def test_a_flat_accelerometer_in_metres_per_second_is_one_of_acceleration():
     acceleration, _ = motion()
     wrong = response()
     wrong.instrument_sensitivity.input_units = wrong.response_stages[0].input_units = "M/S"
-    out = in_acceleration(counts(GAIN * acceleration, response=wrong), TOLERANCE)[0]
+    out = in_acceleration(counts(GAIN * acceleration, response=wrong), TOLERANCE)
     assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
     assert "taken as M/S**2" in out.stats.per_obspy.warnings
 
@@ -350,10 +349,10 @@ def test_an_accelerometer_that_is_described_by_velocity_is_differentiated_with_a
     # counts of acceleration: GAIN at 1 Hz to velocity is GAIN / (2 pi) to acceleration
     out = in_acceleration(
         counts(GAIN / (2 * np.pi) * acceleration, response=by_velocity), TOLERANCE
-    )[0]
+    )
     # the pre-filter of velocity sensors takes what is below 0.01 Hz
     assert_allclose(out.data, acceleration, atol=2e-3 * acceleration.max())
     assert "code N is an accelerometer" in out.stats.per_obspy.warnings
     assert "warnings" not in in_acceleration(
         counts(GAIN * velocity, response=response("M/S"), channel="HHE"), TOLERANCE
-    )[0].stats.get("per_obspy", {})
+    ).stats.get("per_obspy", {})

@@ -12,9 +12,9 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core.inventory import Response
 
 from per_obspy.config import Processing
-from per_obspy.processing import instrument_response, long_records
+from per_obspy.processing import instrument_response, series
+from per_obspy.processing.account import taken
 from per_obspy.processing.chain import process_station
-from per_obspy.processing.notes import taken
 
 RATE, MINUTES, GAIN = 200.0, 20, 4e5
 COUNT = round(60 * MINUTES * RATE)
@@ -42,7 +42,7 @@ def day_in_small(has_event):
 @pytest.fixture
 def small_parts(monkeypatch):
     """Make parts and zeros as small for the record as they are for a day at 200 Hz."""
-    monkeypatch.setattr(long_records, "BLOCK", 2**14)
+    monkeypatch.setattr(series, "BLOCK", 2**14)
     monkeypatch.setattr(instrument_response, "LONGEST_PAD", MINUTES * 60 / 24)
 
 
@@ -65,7 +65,7 @@ def test_memory_per_sample_of_a_component_is_bounded(has_event):
 
 def test_parts_do_not_change_the_record(monkeypatch):
     whole, _ = process_station(day_in_small(has_event=False), Processing())
-    monkeypatch.setattr(long_records, "BLOCK", 2**14)
+    monkeypatch.setattr(series, "BLOCK", 2**14)
     parts, _ = process_station(day_in_small(has_event=False), Processing())
     for expected, found in zip(whole, parts, strict=True):
         # Sums in another order: rounding of 1e-16 over a hundred thousand samples
@@ -84,8 +84,8 @@ def test_a_stream_that_is_not_handed_over_stays_as_it_was():
 
 @pytest.mark.parametrize("count", [0, 1, 3, 4, 9])
 def test_blocks_cover_every_place_once(monkeypatch, count):
-    monkeypatch.setattr(long_records, "BLOCK", 4)
-    places = [place for block in long_records.blocks(2, 2 + count) for place in range(50)[block]]
+    monkeypatch.setattr(series, "BLOCK", 4)
+    places = [place for block in series.blocks(2, 2 + count) for place in range(50)[block]]
     assert places == list(range(2, 2 + count))
 
 
@@ -94,7 +94,7 @@ LEFT = """
 import numpy as np
 from pathlib import Path
 from scipy.fft import rfft
-from per_obspy.processing import long_records
+from per_obspy.processing import series
 
 def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
@@ -103,7 +103,7 @@ rfft(np.ones(1000))
 record = np.ones(2**21 * 3)
 before = resident()
 rfft(record)
-long_records.forget_plans(record.size)
+series.forget_plans(record.size)
 print((resident() - before) / record.nbytes)
 """
 

@@ -5,7 +5,7 @@ import pytest
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_station
-from per_obspy.processing.station.components import is_horizontal
+from per_obspy.processing.components import is_horizontal
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.azimuthal import azimuthal_sd_spectrum, rotd
 from per_obspy.spectra.station import north_and_east

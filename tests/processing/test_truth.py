@@ -6,8 +6,8 @@ from obspy import Stream, Trace, UTCDateTime, read
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process, process_station
+from per_obspy.processing.components import orient
 from per_obspy.processing.instrument_response import in_acceleration
-from per_obspy.processing.station.components import oriented
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.elastic import per_spectrum
 
@@ -128,7 +128,7 @@ def test_usable_periods_of_a_real_record_with_a_known_shift(real_data, shift, se
     folder = real_data / "records" / "ridgecrest2019_mseed"
     found = find_stations(folder)
     stream, _ = read_station(found.stations["CI.CLC"], found.inventory, "CI.CLC")
-    raw = in_acceleration(oriented(stream.select(component="E")), 0.1)[0]
+    raw = in_acceleration(orient(stream.select(component="E")[0]), 0.1)
     truth, dt = process(Stream([raw]))[0], raw.stats.delta
     assert "certain_period" not in truth.stats.per_obspy
     # The shift starts 6 s after the onset, in the strong shaking

@@ -12,7 +12,7 @@ from obspy.core.event import Catalog, Event, Magnitude, Origin
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
-from per_obspy.processing.noise.windows import source_of
+from per_obspy.processing.earthquake import source_of
 from per_obspy.records.event_file import portable, read_event, read_event_file
 
 START = UTCDateTime(2019, 7, 6, 3, 19, 53)

@@ -5,21 +5,21 @@ A baseline that shifts during the shaking leaves a straight line in the final ve
 does not show when the baseline shifted, and PER at long periods depends on that.
 """
 
-from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.fft import irfft
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 from scipy.signal.windows import tukey
+from scipy.sparse import csr_array
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
-from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
-from per_obspy.processing.filter.velocity import final_line
+from per_obspy.processing.filter.baseline import final_line
+from per_obspy.processing.filter.butterworth import butterworth_amplitude, thin_spectrum
 from per_obspy.spectra.elastic import per_spectrum
 
 #: Periods at which PER is compared, s.
@@ -53,15 +53,6 @@ class Shaking(NamedTuple):
 
     onset: float
     end: float
-
-
-class Shifts(NamedTuple):
-    """Numbers of the times of two shifts, and the baseline between and after them, m/s2."""
-
-    first: int
-    second: int
-    between: float
-    after: float
 
 
 def without_drift(samples: FloatArray, dt: float) -> FloatArray:
@@ -122,11 +113,11 @@ def longest_certain_period(
     straight = (plain, detrend(plain))
     if min(_velocity_left(samples, time, shaking) for samples in straight) <= SUSPECTED * peak:
         return np.inf
-    # Shifts that fit the final velocity, and PER after each
+    # Shifts that fit the final velocity, and the record with steps at their times
     times = _times_of_shifts(plain, time, shaking)
     line = final_line(plain, time, shaking.end)
-    shifts = list(_possible_shifts(times, line, LARGEST * float(np.abs(used).max())))
-    if not shifts:
+    shifts = _possible_shifts(times, line, LARGEST * float(np.abs(used).max()))
+    if not shifts.shape[0]:
         return float(PERIODS[0])
     motions = _corrected_motions(plain, time, times, shifts, highpass, settings)
     spread = _spread(used, motions, interval, _weights(plain, time, times, shifts))
@@ -134,13 +125,28 @@ def longest_certain_period(
 
 
 def _spread(
-    used: FloatArray, motions: Sequence[FloatArray], interval: float, weights: FloatArray
+    used: FloatArray, motions: FloatArray, interval: float, weights: FloatArray
 ) -> FloatArray:
     """Return the weighted root mean square of ln PER over that of the record as it is used."""
     reference, *spectra = [
         np.log(per_spectrum(motion, interval, PERIODS)) for motion in (used, *motions)
     ]
     return np.asarray(np.sqrt(weights @ (spectra - reference) ** 2))
+
+
+def _corrected_motions(
+    plain: FloatArray,
+    time: FloatArray,
+    times: FloatArray,
+    shifts: csr_array,
+    highpass: float,
+    settings: Processing,
+) -> FloatArray:
+    """Return the filtered record after each correction: sums of it and of steps at the times."""
+    parts = np.vstack([plain, time >= times[:, np.newaxis]])
+    parts *= tukey(plain.size, 2 * settings.taper)
+    filtered = _filtered(parts, float(time[1]), highpass, settings.order)
+    return np.asarray(filtered[0] - shifts @ filtered[1:])
 
 
 def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
@@ -155,36 +161,14 @@ def _thinning(dt: float) -> int:
     return max(int(INTERVAL / dt), 1)
 
 
-def _corrected_motions(
-    plain: FloatArray,
-    time: FloatArray,
-    times: FloatArray,
-    shifts: Sequence[Shifts],
-    highpass: float,
-    settings: Processing,
-) -> list[FloatArray]:
-    """Return the filtered record after each correction: sums of it and of steps at the times."""
-    taper = tukey(plain.size, 2 * settings.taper)
-    parts = np.vstack([plain, time >= times[:, np.newaxis]]) * taper
-    record, *steps = _filtered(parts, float(time[1]), highpass, settings.order)
-    return [_corrected(record, steps, shift) for shift in shifts]
-
-
 def _filtered(signals: FloatArray, dt: float, highpass: float, order: int) -> FloatArray:
     """Return signals (n_signals, n_samples) with zero pads, filtered, at a longer interval."""
-    # Pads as long as those of the filter, a whole number of thinned samples
-    thin, samples = _thinning(dt), signals.shape[1]
-    pad = int(np.ceil(PAD * order / highpass / dt / thin)) if highpass else 0
-    points = next_fast_len(int(np.ceil(samples / thin)) + 2 * pad, real=True)
-    padded = np.zeros((signals.shape[0], points * thin))
-    padded[:, pad * thin : pad * thin + samples] = signals
-    # Fewer frequencies: fewer points after the inverse transform
-    frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1]
-    amplitude = butterworth_amplitude(frequencies, highpass, np.inf, order)
-    filtered = irfft(rfft(padded)[:, : frequencies.size] * amplitude, points) / thin
+    thin = _thinning(dt)
+    frequencies, spectrum, points, pad = thin_spectrum(signals, dt, highpass, order, thin)
+    spectrum *= butterworth_amplitude(frequencies, highpass, np.inf, order)
     # The ends of long pads move none of the oscillators
     unused = max(pad - round(LONGEST_PAD / (thin * dt)), 0)
-    return np.asarray(filtered[:, unused : points - unused])
+    return np.asarray(irfft(spectrum, points)[:, unused : points - unused] / thin)
 
 
 def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> FloatArray:
@@ -196,25 +180,26 @@ def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> F
     return np.array([shaking.onset, *inner, shaking.end])
 
 
-def _possible_shifts(
-    times: FloatArray, line: tuple[float, float], largest: float
-) -> Iterator[Shifts]:
-    """Yield the shifts at each pair of times that turn the final line of the velocity to zero."""
+def _possible_shifts(times: FloatArray, line: tuple[float, float], largest: float) -> csr_array:
+    """
+    Return the shifts at each pair of times that turn the final line of the velocity to zero.
+
+    Each row has the steps of the baseline at all times, m/s2: its shift between the two at the
+    first, and the difference to that from then on at the second.
+    """
     constant, slope = line
+    rows = []
     for first, second in combinations(range(times.size), 2):
-        final, length = constant + slope * times[second], times[second] - times[first]
-        if abs(final) < largest * length:
-            yield Shifts(first, second, final / length, slope)
-
-
-def _corrected(record: FloatArray, steps: Sequence[FloatArray], shifts: Shifts) -> FloatArray:
-    """Return the record less both shifts, from its responses to steps at the times."""
-    first, second, between, after = shifts
-    return record - between * steps[first] - (after - between) * steps[second]
+        # The velocity that stays, over the time of the first shift
+        between = (constant + slope * times[second]) / (times[second] - times[first])
+        if abs(between) < largest:
+            rows.append(np.zeros(times.size))
+            rows[-1][[first, second]] = between, slope - between
+    return csr_array(np.reshape(rows, (-1, times.size)))
 
 
 def _weights(
-    plain: FloatArray, time: FloatArray, times: FloatArray, shifts: Sequence[Shifts]
+    plain: FloatArray, time: FloatArray, times: FloatArray, shifts: csr_array
 ) -> FloatArray:
     """Return the weight of each correction, from the displacement that it leaves in the shaking."""
     velocity = cumulative_trapezoid(plain, time, initial=0)
@@ -222,7 +207,7 @@ def _weights(
     # Displacement of a step of 1 m/s2 at each time
     during = (time >= times[0]) & (time <= times[-1])
     parabolas = np.maximum(time[during] - times[:, np.newaxis], 0.0) ** 2 / 2
-    left = [_corrected(displacement[during], parabolas, shift) for shift in shifts]
+    left = displacement[during] - shifts @ parabolas
     misfits = np.sqrt(np.mean(np.square(left), axis=1))
     weights = 1 / (misfits + FLOOR * misfits.max())
     return np.asarray(weights / weights.sum())

@@ -7,41 +7,42 @@ The pads stay: the filtered motion leaks into them.
 from functools import reduce
 
 import numpy as np
-from obspy import Stream
+from numpy.typing import NDArray
+from obspy import Trace
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from per_obspy.checks import FloatArray, finite, number, positive
-from per_obspy.processing.long_records import blocks, forget_plans
-from per_obspy.processing.notes import copied, noted
+from per_obspy.processing.account import copy_header, with_note
+from per_obspy.processing.series import blocks, forget_plans, is_long
 
 #: Length of each pad in periods of the corner per order of the filter (Boore 2005).
 PAD = 0.75
 
 
-def tapered(stream: Stream, fraction: float) -> Stream:
+def taper(trace: Trace, fraction: float) -> Trace:
     """
     Return a copy with ends that rise from and fall to zero as half a Hann window each.
 
     Parameters
     ----------
-    stream : obspy Stream
+    trace : obspy Trace
     fraction : float
         Of the record at each end, dimensionless, at most 0.5.
 
     Returns
     -------
-    obspy Stream
+    obspy Trace
     """
-    out = copied(stream)
-    if fraction:
-        for trace in out:
-            trace.data = trace.data.copy()  # tapered in place
-            trace.taper(fraction, type="hann")
-            noted(trace, f"{fraction:g} of each end tapered", taper=fraction)
-    return out
+    if not fraction:
+        return trace
+    # ObsPy tapers in place
+    out = copy_header(trace)
+    out.data = trace.data.copy()
+    out.taper(fraction, type="hann")
+    return with_note(out, f"{fraction:g} of each end tapered", taper=fraction)
 
 
-def padded(stream: Stream, highpass: float, order: int) -> Stream:
+def pad(trace: Trace, highpass: float, order: int) -> Trace:
     """
     Return a copy with zeros before and after.
 
@@ -52,7 +53,7 @@ def padded(stream: Stream, highpass: float, order: int) -> Stream:
 
     Parameters
     ----------
-    stream : obspy Stream
+    trace : obspy Trace
     highpass : float
         Corner of the filter to come, Hz.
     order : int
@@ -60,27 +61,73 @@ def padded(stream: Stream, highpass: float, order: int) -> Stream:
 
     Returns
     -------
-    obspy Stream
+    obspy Trace
 
     References
     ----------
     Boore 2005, Bull. Seism. Soc. Am. 95, 745-750.
     """
     number("highpass", highpass, positive)
-    out = copied(stream)
-    for trace in out:
-        dt, count = trace.stats.delta, trace.stats.npts
-        # The end gets the samples up to the next length that is quick to transform
-        before = int(np.ceil(PAD * order / highpass / dt))
-        length = next_fast_len(count + 2 * before, real=True)
-        after = length - count - before
-        trace.data = np.pad(trace.data, (before, after))
-        trace.stats.starttime -= before * dt
-        # Seconds of zeros
-        pads = {"pad_before": before * dt, "pad_after": after * dt}
-        step = f"{pads['pad_before']:g} s of zeros before and {pads['pad_after']:g} s after"
-        noted(trace, step, **pads)
+    dt, count = trace.stats.delta, trace.stats.npts
+    # The end gets the samples up to the next length that is quick to transform
+    before = int(np.ceil(PAD * order / highpass / dt))
+    after = next_fast_len(count + 2 * before, real=True) - count - before
+    # Seconds of zeros
+    pads = {"pad_before": before * dt, "pad_after": after * dt}
+    step = f"{pads['pad_before']:g} s of zeros before and {pads['pad_after']:g} s after"
+    out = with_note(trace, step, np.pad(trace.data, (before, after)), **pads)
+    out.stats.starttime -= before * dt
     return out
+
+
+def thin_spectrum(
+    signals: FloatArray, dt: float, highpass: float, order: int, thin: int
+) -> tuple[FloatArray, NDArray[np.complex128], int, int]:
+    """
+    Return the low frequencies of signals with zero pads: those of a grid with fewer points.
+
+    A long record is transformed as the sum of its interleaved parts, each turned by its delay: at
+    the low frequencies alone that takes a tenth of the memory.
+
+    Parameters
+    ----------
+    signals : (..., n_samples) ndarray
+    dt : float
+        Sampling interval, s.
+    highpass, order
+        Of the filter to come, Hz, which decide the length of the pads; a corner of 0 needs none.
+    thin : int
+        Samples of the record for each point of the grid.
+
+    Returns
+    -------
+    frequencies : (n_frequencies,) ndarray
+        Hz.
+    spectrum : (..., n_frequencies) ndarray
+        To be divided by the factor of thinning: its inverse transform has fewer points.
+    points, pad : int
+        Number of points of the grid, and of those in the pad before the record.
+    """
+    # Pads and signals on a grid that is thinner by a whole number
+    samples = signals.shape[-1]
+    pad = int(np.ceil(PAD * order / highpass / dt / thin)) if highpass else 0
+    points = next_fast_len(int(np.ceil(samples / thin)) + 2 * pad, real=True)
+    padded = np.zeros((*signals.shape[:-1], points * thin))
+    padded[..., pad * thin : pad * thin + samples] = signals
+    # The low frequencies alone: a view would hold all of them
+    frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1].copy()
+    spectrum = _low_frequencies(padded, frequencies.size, thin if is_long(samples) else 1)
+    return frequencies, spectrum, points, pad
+
+
+def _low_frequencies(signals: FloatArray, count: int, parts: int) -> NDArray[np.complex128]:
+    """Return the first lines of spectra, as the sum of interleaved parts turned by their delays."""
+    # One part of ordinary records
+    spectrum: NDArray[np.complex128] = rfft(signals[..., ::parts])[..., :count]
+    for first in range(1, parts):
+        turn = np.exp(-2j * np.pi * first / signals.shape[-1] * np.arange(count))
+        spectrum = spectrum + rfft(signals[..., first::parts])[..., :count] * turn
+    return spectrum
 
 
 def butterworth_amplitude(
@@ -158,27 +205,24 @@ def acausal_bandpass(
     return np.asarray(out)
 
 
-def filtered(stream: Stream, highpass: float, lowpass: float, order: int) -> Stream:
+def bandpass(trace: Trace, highpass: float, lowpass: float, order: int) -> Trace:
     """
     Return a copy filtered by `acausal_bandpass`.
 
     Parameters
     ----------
-    stream : obspy Stream
+    trace : obspy Trace
         Padded.
     highpass, lowpass, order
         As in `butterworth_amplitude`.
 
     Returns
     -------
-    obspy Stream
+    obspy Trace
     """
-    out = copied(stream)
-    for trace in out:
-        rate = trace.stats.sampling_rate
-        trace.data = acausal_bandpass(trace.data, rate, highpass, lowpass, order)
-        # Corners as applied: a high-pass at 0 is none
-        applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
-        step = f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz"
-        noted(trace, step, order=order, **applied)
-    return out
+    rate = trace.stats.sampling_rate
+    samples = acausal_bandpass(trace.data, rate, highpass, lowpass, order)
+    # Corners as applied: a high-pass at 0 is none
+    applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
+    step = f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz"
+    return with_note(trace, step, samples, order=order, **applied)

@@ -12,10 +12,10 @@ import numpy as np
 from obspy import Trace
 
 from per_obspy.checks import FloatArray, number, positive
-from per_obspy.processing.filter import velocity
+from per_obspy.processing.filter import baseline
 from per_obspy.processing.filter.butterworth import acausal_bandpass
-from per_obspy.processing.noise.onset import picked_onset
-from per_obspy.processing.noise.signal_to_noise import significant_samples
+from per_obspy.processing.noise_window import picked_onset
+from per_obspy.processing.series import significant_samples
 
 
 def acausal_butterworth(
@@ -85,7 +85,7 @@ def boore_segments(
     Remove two baseline shifts from acceleration, one during the shaking and one from then on.
 
     ``trace.detrend("boore_segments")`` calls it: see
-    :func:`~per_obspy.processing.filter.velocity.boore_segments`.
+    :func:`~per_obspy.processing.filter.baseline.boore_segments`.
 
     Parameters
     ----------
@@ -108,11 +108,7 @@ def boore_segments(
         If no onset can be picked, or if the times are not within the record.
     """
     step = _sampling_interval(dt, inspect.currentframe())
-    if first is None or second is None:
-        onset, end = _shaking(data, step)
-        first = onset if first is None else first
-        second = end if second is None else second
-    return velocity.boore_segments(data, step, first, second)
+    return baseline.boore_segments(data, step, *_shaking(data, step, first, second))
 
 
 def velocity_residual(
@@ -125,7 +121,7 @@ def velocity_residual(
     Remove the slope of the residual velocity before and after the shaking from acceleration.
 
     ``trace.detrend("velocity_residual")`` calls it: see
-    :func:`~per_obspy.processing.filter.velocity.velocity_residual`.
+    :func:`~per_obspy.processing.filter.baseline.velocity_residual`.
 
     Parameters
     ----------
@@ -148,11 +144,7 @@ def velocity_residual(
         If no onset can be picked, or if the times are not within the first 90 % of the record.
     """
     step = _sampling_interval(dt, inspect.currentframe())
-    if onset is None or end is None:
-        picked, finished = _shaking(data, step)
-        onset = picked if onset is None else onset
-        end = finished if end is None else end
-    return velocity.velocity_residual(data, step, onset, end)
+    return baseline.velocity_residual(data, step, *_shaking(data, step, onset, end))
 
 
 def displacement_polynomial(
@@ -162,7 +154,7 @@ def displacement_polynomial(
     Remove the second derivative of the polynomial that fits the displacement from acceleration.
 
     ``trace.detrend("displacement_polynomial")`` calls it: see
-    :func:`~per_obspy.processing.filter.velocity.displacement_polynomial`.
+    :func:`~per_obspy.processing.filter.baseline.displacement_polynomial`.
 
     Parameters
     ----------
@@ -179,7 +171,7 @@ def displacement_polynomial(
         m/s2.
     """
     step = _sampling_interval(dt, inspect.currentframe())
-    return velocity.displacement_polynomial(data, step, order)
+    return baseline.displacement_polynomial(data, step, order)
 
 
 def _given_once(
@@ -205,10 +197,16 @@ def _sampling_interval(dt: float | None, frame: FrameType | None) -> float:
     return float(trace.stats.delta)
 
 
-def _shaking(data: FloatArray, dt: float) -> tuple[float, float]:
-    """Return the picked onset and the end of the significant shaking, s from the first sample."""
+def _shaking(
+    data: FloatArray, dt: float, onset: float | None, end: float | None
+) -> tuple[float, float]:
+    """Return onset and end of the shaking, s: picked, and of the significant motion, if None."""
+    if onset is not None and end is not None:
+        return onset, end
+    # What is not given is picked
     picked = picked_onset(Trace(np.asarray(data, dtype=np.float64), {"delta": dt}))
     if picked is None:
         raise ValueError("no onset of the shaking can be picked: give the times of the shaking")
-    onset = picked[0]
-    return onset, onset + significant_samples(data[round(onset / dt) :]) * dt
+    first = picked[0]
+    last = first + significant_samples(data[round(first / dt) :]) * dt
+    return first if onset is None else onset, last if end is None else end

@@ -1,0 +1,229 @@
+"""
+What an earthquake decides about a record: the first wave, and the corner of one without noise.
+
+The computed P wave chooses among the picks of an instrument, and the magnitude gives the corner of
+a record without noise. A station keeps each decision with its causes. An earthquake of another
+place, time or magnitude that leads to the same decisions leads to the same motion to the last bit,
+so that the station is not processed again.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache
+from statistics import median
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from obspy import Trace, UTCDateTime
+from obspy.core.event import Event
+from obspy.geodetics import locations2degrees
+
+from per_obspy.config import Processing
+from per_obspy.processing.account import FROM_CONSTANT, FROM_TABLE
+
+if TYPE_CHECKING:
+    from obspy.taup import TauPyModel
+
+#: Velocity model of the Earth for travel times.
+MODEL = "iasp91"
+
+METRES_PER_KILOMETRE = 1000.0
+
+#: Depth of a hypocentre whose depth is unknown, km.
+UNKNOWN_DEPTH = 10
+
+#: Digits after the point of a computed P time, s: its error is that of the origin and the model.
+P_DIGITS = 1
+
+#: Traces whose picks are tried in turn.
+DIRECTIONS = ("vertical", "horizontal")
+
+
+class Source(NamedTuple):
+    """
+    Origin and magnitude of an event.
+
+    Attributes
+    ----------
+    time : UTCDateTime
+        Of the origin.
+    latitude, longitude : float
+        Degrees.
+    depth : float
+        m.
+    magnitude : float or None
+        The preferred one, or the first.
+    decisions : list of dict or None
+        Collects every decision of the processing that depends on the event, with its causes, as
+        plain values: see `same_decisions`.
+    """
+
+    time: UTCDateTime
+    latitude: float
+    longitude: float
+    depth: float
+    magnitude: float | None
+    decisions: list[dict[str, Any]] | None = None
+
+    def note(self, **decision: object) -> None:
+        """Collect a decision, each once."""
+        if self.decisions is not None and decision not in self.decisions:
+            self.decisions.append(decision)
+
+
+class Corner(NamedTuple):
+    """A corner, Hz, and the reason for it."""
+
+    frequency: float
+    reason: str
+
+
+def source_of(event: Event, decisions: list[dict[str, Any]] | None = None) -> Source:
+    """Return the preferred origin and magnitude of an event with at least one origin."""
+    origin = event.preferred_origin() or event.origins[0]
+    magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    # Depths above the reference surface count as 0
+    unknown = UNKNOWN_DEPTH * METRES_PER_KILOMETRE
+    depth = unknown if origin.depth is None else max(origin.depth, 0.0)
+    size = None if magnitude is None else float(magnitude.mag)
+    return Source(origin.time, origin.latitude, origin.longitude, depth, size, decisions)
+
+
+def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
+    """
+    Compute the arrival time of the first P wave, None if the trace has no coordinates.
+
+    References
+    ----------
+    Kennett & Engdahl 1991, Geophys. J. Int. 105, 429-465 (iasp91), as in ObsPy.
+    """
+    place = trace.stats.get("coordinates")
+    return _p_arrival_at(place.latitude, place.longitude, source) if place else None
+
+
+def _p_arrival_at(latitude: float, longitude: float, source: Source) -> UTCDateTime | None:
+    """Compute the arrival time of the first P wave at a place."""
+    degrees = locations2degrees(source.latitude, source.longitude, latitude, longitude)
+    kilometres = source.depth / METRES_PER_KILOMETRE
+    arrivals = _model().get_travel_times(kilometres, degrees, phase_list=["ttp"])
+    return source.time + arrivals[0].time if arrivals else None
+
+
+@lru_cache(maxsize=1)
+def _model() -> "TauPyModel":
+    """Return the velocity model, loaded once."""
+    # ObsPy's travel times load Matplotlib too: a quarter of the time in which a worker begins
+    from obspy.taup import TauPyModel
+
+    return TauPyModel(MODEL)
+
+
+def first_wave(
+    picked: Callable[[str], Sequence[UTCDateTime]],
+    computed: UTCDateTime | None,
+    tolerance: float,
+    end: UTCDateTime,
+) -> tuple[UTCDateTime | None, str]:
+    """
+    Return the time of the first wave, None if there is no clear one, and the method.
+
+    Parameters
+    ----------
+    picked : callable
+        Returns the picks of the traces of a direction, one of `DIRECTIONS`.
+    computed : UTCDateTime or None
+        P wave by the travel time; rounded, so that a negligible change of origin changes nothing.
+    tolerance : float
+        Between a pick and the computed P, s.
+    end : UTCDateTime
+        Of the record. A P wave after it contradicts every pick: the station is in a wrong place, or
+        its clock is wrong, and the picks count.
+    """
+    if computed is not None:
+        computed = UTCDateTime(round(computed.timestamp, P_DIGITS))
+    # The vertical first: P moves it most
+    for direction in DIRECTIONS:
+        times = picked(direction)
+        if computed is not None and computed <= end:
+            times = [time for time in times if abs(time - computed) <= tolerance]
+        if times:
+            middle = median(time.timestamp for time in times)
+            return UTCDateTime(middle), f"median of {len(times)} picked {direction}"
+    if computed is not None:
+        return computed, f"travel time of P, {MODEL}"
+    return None, "no clear onset"
+
+
+def fallback_highpass(
+    magnitude: float | None, by_magnitude: dict[float, float], unknown: float
+) -> Corner:
+    """
+    Return the high-pass corner of a record without measurable noise.
+
+    Parameters
+    ----------
+    magnitude : float or None
+        Of the event.
+    by_magnitude : dict
+        Smallest magnitude -> corner, Hz.
+    unknown : float
+        Corner without a magnitude, Hz.
+
+    Returns
+    -------
+    Corner
+
+    Examples
+    --------
+    >>> fallback_highpass(6.1, {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1}, 0.08).frequency
+    0.1
+    """
+    if magnitude is None:
+        return Corner(unknown, f"{FROM_CONSTANT}neither noise nor magnitude known")
+    reached = [size for size in by_magnitude if magnitude >= size]
+    if not reached:
+        return Corner(unknown, f"{FROM_CONSTANT}the magnitude is below the table")
+    # The row, not the magnitude: an update within the row changes no record
+    reason = f"{FROM_TABLE} recorded, magnitude from {max(reached):g}"
+    return Corner(by_magnitude[max(reached)], reason)
+
+
+def same_decisions(
+    decisions: Iterable[Mapping[str, Any]], source: Source, settings: Processing
+) -> bool:
+    """
+    Return whether an earthquake leads to the decisions of an earlier processing.
+
+    Parameters
+    ----------
+    decisions : iterable of mapping
+        Collected by a `Source`, perhaps read from a file.
+    source : Source
+        The earthquake now.
+    settings : Processing
+        Those of the earlier processing.
+
+    Returns
+    -------
+    bool
+        False as well if a decision is damaged, or would depend on traces that were not picked.
+    """
+    try:
+        return all(_is_same(decision, source, settings) for decision in decisions)
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        return False
+
+
+def _is_same(decision: Mapping[str, Any], source: Source, settings: Processing) -> bool:
+    """Return whether an earthquake leads to one earlier decision; `KeyError` without its picks."""
+    if "onset" not in decision:
+        table, unknown = settings.fallback_highpass, settings.unknown_highpass
+        corner = fallback_highpass(source.magnitude, table, unknown)
+        return list(corner) == list(decision["highpass"])
+    # The same picks, with the P of the event now
+    picks = {
+        name: [UTCDateTime(ns=ns) for ns in times] for name, times in decision["picks"].items()
+    }
+    latitude, longitude = decision["place"]
+    computed = _p_arrival_at(latitude, longitude, source)
+    end = UTCDateTime(ns=decision["end"])
+    onset, method = first_wave(picks.__getitem__, computed, settings.pick_tolerance, end)
+    return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])

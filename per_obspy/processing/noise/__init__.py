@@ -1,1 +1,0 @@
-"""Separate noise from signal: onset, windows, smoothing and signal-to-noise ratio."""

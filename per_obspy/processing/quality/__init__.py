@@ -1,1 +1,0 @@
-"""Check raw and processed traces and collect the reasons for rejection."""

@@ -1,1 +1,0 @@
-"""Assemble the traces of one station: merge, splice and pair components."""
