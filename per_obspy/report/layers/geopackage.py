@@ -47,7 +47,7 @@ def points(longitude: FloatArray, latitude: FloatArray) -> Shapes:
 
 
 #: Version of the specification (https://geoparquet.org/releases/v1.1.0), and name of the shapes.
-VERSION, GEOMETRY = "1.1.0", "geometry"
+VERSION, PARQUET_GEOMETRY = "1.1.0", "geometry"
 
 
 class GeoParquet:
@@ -66,11 +66,15 @@ class GeoParquet:
 
     def append(self, table: pd.DataFrame, shapes: Shapes) -> None:
         """Append rows; those of the first piece decide the types of all columns."""
-        rows = with_shapes(table, shapes, GEOMETRY)
+        rows = with_shapes(table, shapes, PARQUET_GEOMETRY)
         if self._writer is None:
             # Without a reference system coordinates are longitude and latitude, WGS 84
             column = {"encoding": "WKB", "geometry_types": _types(shapes)}
-            geo = {"version": VERSION, "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+            geo = {
+                "version": VERSION,
+                "primary_column": PARQUET_GEOMETRY,
+                "columns": {PARQUET_GEOMETRY: column},
+            }
             schema = rows.schema.with_metadata({"geo": json.dumps(geo)})
             self._writer = pq.ParquetWriter(self.path, schema)
         self._writer.write_table(rows.cast(self._writer.schema))

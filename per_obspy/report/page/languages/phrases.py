@@ -78,7 +78,7 @@ SPANISH_PHRASES: dict[str, str] = {
     " is not a number": " no es un número",
     " is empty": " está vacío",
     " is outside ": " está fuera de ",
-    " is unknown, expected ": " se desconoce, se espera ",
+    "is unknown, expected ": "se desconoce, se espera ",
     " or more": " o más",
     "occurs in an earlier row already": "ya está en una fila anterior",
     "is a number, one is needed": "es un número, hace falta uno",
