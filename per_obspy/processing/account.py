@@ -261,7 +261,8 @@ class Findings(list[Finding]):
             return False
         # In the words of the check
         meaning = (LEAST[check] if is_least else MOST[check]).format(*words)
-        self.add(check, f"{meaning} {figure:.4g}, {'needs' if is_least else 'allowed'} {limit:g}")
+        bound = f", needs {limit:g}" if is_least else f", allowed {limit:g}"
+        self.add(check, f"{meaning} {figure:.4g}{bound}")
         return True
 
     def add(self, check: str, reason: str) -> None:

@@ -162,7 +162,7 @@ def _check_limits(samples: FloatArray, findings: Findings) -> None:
     checks = findings.checks
     run, pinned = longest_extreme_run(samples), pinned_samples(samples)
     if run >= checks.clipped_run.threshold:
-        findings.add("clipped_run", f"{CLIPPED}: {run} equal samples at an extreme")
+        findings.add("clipped_run", f"clipped: {run} equal samples at an extreme")
     elif pinned >= checks.pinned.threshold:
         findings.add("pinned", f"{CLIPPED}: {pinned} samples are equal to an extreme")
     # Below full scale, with noise on top
