@@ -7,7 +7,7 @@ from typing import Any
 from per_obspy.config import Processing
 from per_obspy.processing.decisions import same_decisions
 from per_obspy.processing.noise.windows import Source, source_of
-from per_obspy.records.event_file import EventFile
+from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.spectra.storage import read_spectra, write_spectra
 
 

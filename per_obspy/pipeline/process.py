@@ -20,7 +20,7 @@ from per_obspy.processing.notes import taken
 from per_obspy.processing.station.structures import kept_apart
 from per_obspy.processing.unprocessed import before_processing
 from per_obspy.progress import Progress
-from per_obspy.records.event_file import read_event_file
+from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
 from per_obspy.records.sources import find_path_sources
 from per_obspy.report.records import draw_records

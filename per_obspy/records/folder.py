@@ -42,8 +42,8 @@ from per_obspy.records.contents.metadata_files import (
     read_station_text,
 )
 from per_obspy.records.contents.one_series import without_doubles, without_integrals
+from per_obspy.records.earthquakes.earthquake import Earthquake, header_event
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
-from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import UNKNOWN_FORMAT, read_content
 from per_obspy.records.processed_files import described
@@ -177,7 +177,7 @@ class _File(NamedTuple):
     records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
     rows: tuple[StationRow, ...] = ()
-    events: Mapping[str, HeaderEvent] = MappingProxyType({})
+    events: Mapping[str, Earthquake] = MappingProxyType({})
     rejection: Rejection | None = None
 
 
@@ -232,7 +232,7 @@ def _records(found: list[_File]) -> tuple[RecordSpan, ...]:
     return tuple(_with_event(record, events) for record in records)
 
 
-def _with_event(record: RecordSpan, events: Mapping[str, HeaderEvent]) -> RecordSpan:
+def _with_event(record: RecordSpan, events: Mapping[str, Earthquake]) -> RecordSpan:
     """Return a record with the event of its station's metadata if that has more facts."""
     event = events.get(bare_name(record.station.split(".", 1)[1]))
     known = record.event.known if record.event else 0

@@ -17,7 +17,7 @@ from per_obspy.config import Processing
 from per_obspy.errors import CatalogError, NothingUsable
 from per_obspy.formats.peer_at2 import write_at2
 from per_obspy.processing.chain import process_station
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.folder import find_stations, read_station
 
 

@@ -21,7 +21,7 @@ from per_obspy.errors import RecordRejected
 from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
 from per_obspy.records.contents.metadata_files import read_inventories
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.folder import find_stations
 from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy
 from per_obspy.records.summary import describe_records

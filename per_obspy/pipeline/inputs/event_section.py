@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from per_obspy.pipeline.fetch import CHANNELS
-from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
+from per_obspy.records.earthquakes.services import OTHERS, RECORDS_OF, event_of
 
 
 def event_section(identifier: str, cache: Path) -> dict[str, object]:
@@ -13,7 +13,7 @@ def event_section(identifier: str, cache: Path) -> dict[str, object]:
     Parameters
     ----------
     identifier : str
-        As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it.
+        As :func:`per_obspy.records.earthquakes.services.event_of` takes it.
     cache : Path
         Cache of the fetched files.
 

@@ -14,6 +14,12 @@ from obspy.core.event import Event
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.records.archives.archive_files import LIMITS
+from per_obspy.records.earthquakes.earthquake import (
+    AgreedEvent,
+    Earthquake,
+    agreed_event,
+    origin_of,
+)
 from per_obspy.records.earthquakes.groups import (
     GAP,
     HOURS,
@@ -27,7 +33,6 @@ from per_obspy.records.earthquakes.groups import (
     joining_gap,
     station_files,
 )
-from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
 from per_obspy.records.folder import SourceContents, read_station
 
 log = logging.getLogger(__name__)
@@ -79,24 +84,24 @@ def one_earthquake(
     CatalogError
         If no record is of the configured time or the origin time.
     """
-    groups = event_groups(found.records, records.event_gap)
-    time, source = _time(records, event)
-    reader = _reader(records.archives)
+    gap, (time, source) = records.event_gap, _time(records, event)
+    groups = event_groups(found.records, gap)
+    reader: Reader = partial(read_station)
+    if records.archives != LIMITS:
+        reader = partial(read_station, limits=records.archives)
     motion = partial(largest_motion, found, reader)
-    group = chosen_group(groups, time, source, motion, records.event_gap)
+    group = chosen_group(groups, time, source, motion, gap)
     alike = differ_by_clocks(groups, group)
-    gap = joining_gap([group, *alike])
-    facts = [_facts(other, group, gap if other in alike else None) for other in groups]
+    joined = joining_gap([group, *alike])
+    facts = [_facts(other, group, joined if other in alike else None) for other in groups]
     # Without an event of the configuration that of the headers counts
     if event is None:
-        reader = reader_of_event(reader, group_event(group, records.event_gap))
+        reader = reader_of_event(reader, group_event(group, gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
-    rejected = (*found.rejected, *_rejections(others, group, alike))
-    mixed = {record.path for record in others}
-    found = found._replace(rejected=rejected)
-    return OneEarthquake(_contents(found, group, mixed, reader), facts)
+    found = found._replace(rejected=(*found.rejected, *_rejections(others, group, alike)))
+    return OneEarthquake(_contents(found, group, {record.path for record in others}, reader), facts)
 
 
 def read_station_of(
@@ -104,7 +109,7 @@ def read_station_of(
     inventory: Inventory | None,
     station: str | None = None,
     *,
-    event: HeaderEvent,
+    event: Earthquake,
     **options: Any,
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
@@ -114,18 +119,13 @@ def read_station_of(
     ----------
     paths, inventory, station, **options
         As for ``read_station``.
-    event : HeaderEvent
+    event : Earthquake
         Takes the place of ``stats.event`` of every trace.
     """
     stream, rejected = read_station(paths, inventory, station, **options)
     for trace in stream:
         trace.stats.event = AttribDict(event.words)
     return stream, rejected
-
-
-def _reader(limits: config.Archives) -> Reader:
-    """Return the reader of a folder's stations, with limits of archives that are no default."""
-    return partial(read_station) if limits == LIMITS else partial(read_station, limits=limits)
 
 
 def _contents(
@@ -176,19 +176,13 @@ def peak_motion(trace: Trace) -> tuple[float, str]:
     """Return the largest distance from the mean and its unit; of raw counts by the sensitivity."""
     if not trace.stats.npts:
         return 0.0, ""
-    scale, unit = _scale(trace)
+    stats, scale = trace.stats, 1.0
+    if stats.units == "counts":
+        has_response = "response" in stats
+        scale = 1.0 / stats.response.instrument_sensitivity.value if has_response else stats.calib
+    unit = _UNITS[stats.quantity] if stats.units == "counts" else stats.units
     # Raw records have an offset
     return float(np.abs(trace.data - trace.data.mean()).max()) * scale, unit
-
-
-def _scale(trace: Trace) -> tuple[float, str]:
-    """Return the factor from samples to SI, and the unit it leads to."""
-    stats = trace.stats
-    if stats.units != "counts":
-        return 1.0, stats.units
-    if "response" in stats:
-        return 1.0 / stats.response.instrument_sensitivity.value, _UNITS[stats.quantity]
-    return stats.calib, _UNITS[stats.quantity]
 
 
 def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | None, str]:
@@ -197,8 +191,7 @@ def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | N
         return UTCDateTime(records.time), "records.time"
     if event is None:
         return None, ""
-    origin = event.preferred_origin() or event.origins[0]
-    return origin.time, "records.event"
+    return origin_of(event).time, "records.event"
 
 
 def _limits(group: EventGroup) -> dict[str, UTCDateTime]:

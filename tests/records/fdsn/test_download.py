@@ -24,8 +24,8 @@ from seedlink_server import seedlink
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.records.fdsn.download import Offer, fetch_station
 from per_obspy.records.fdsn.request import Wanted, wanted_around
-from per_obspy.records.fdsn.web import web_pool
-from per_obspy.records.seedlink.server_address import server_address
+from per_obspy.records.fdsn.web import WebPool
+from per_obspy.records.seedlink import server_address
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 from per_obspy.resume import read_status
 
@@ -53,7 +53,7 @@ def wanted(simulation: Simulation) -> Wanted:
 
 def download(wanted: Wanted, folder: Path, *services: str):
     offers = [Offer(service, CHANNELS) for service in services]
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01)
     return fetch_station(pool, wanted, folder, "XX.S001", offers)
 
 
@@ -214,7 +214,7 @@ def test_real_time_records_of_another_time_are_refused(server, wanted, tmp_path:
         live.instead = lambda handler: handler.wfile.write(
             b"".join(b"SL%06X" % number + packet for number, packet in enumerate(packets)) + b"END"
         )
-        pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+        pool = WebPool(timeout=10.0, retries=0, wait=0.01)
         outcome = fetch_station(
             pool,
             wanted,
