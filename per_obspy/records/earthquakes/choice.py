@@ -1,7 +1,7 @@
 """Choose the one earthquake of a folder that is screened, and reject the records of others."""
 
 import logging
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +31,7 @@ from per_obspy.records.earthquakes.groups import (
     event_groups,
     follows,
     joining_gap,
+    span_of,
     station_files,
 )
 from per_obspy.records.folder import SourceContents, read_station
@@ -55,7 +56,7 @@ class OneEarthquake(NamedTuple):
     earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
         (records without a date that are taken for this earthquake), ``screened``, ``headers``: the
-        earthquake by the headers of its records, see ``earthquakes.header_event``; and
+        earthquake by the headers of its records, see ``earthquakes.earthquake``; and
         ``joined_by``: the ``records.event_gap``, s, that takes a group for the screened earthquake,
         from which it may differ by its clocks only; else None.
     """
@@ -129,36 +130,27 @@ def read_station_of(
 
 
 def _contents(
-    found: SourceContents, group: EventGroup, mixed: Container[Path], reader: Reader
+    found: SourceContents, group: EventGroup, mixed: set[Path], reader: Reader
 ) -> tuple[tuple[SourceContents, Reader], ...]:
     """Return the stations of a group with their readers; the first contents have rejections."""
-    # Stations of which only a window is read have a separate reader
     whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
     for station, paths in station_files(group.records).items():
-        limits = _station_limits(station, group, mixed)
+        own = [record for record in group.records if record.station == station]
+        limits = dict[str, UTCDateTime]()
+        # Hours of record are cut to the time of the triggered records of all stations
+        if any(record.end - record.start > HOURS for record in own):
+            limits = _limits(group)
+        # A file with records of several earthquakes is cut to the chosen one
+        elif not mixed.isdisjoint(paths):
+            start, end = span_of(own)
+            limits = {"start": start, "end": end}
+        # Stations of which only a window is read have a separate reader
         if limits:
             part = found._replace(stations={station: paths}, rejected=())
             windows.append((part, partial(reader, **limits)))
         else:
             whole[station] = paths
     return (found._replace(stations=whole), reader), *windows
-
-
-def _station_limits(
-    station: str, group: EventGroup, mixed: Container[Path]
-) -> dict[str, UTCDateTime]:
-    """Return the window to read of a station's files; empty if they are read whole."""
-    own = [record for record in group.records if record.station == station]
-    # Hours of record are cut to the time of the triggered records of all stations
-    if any(record.end - record.start > HOURS for record in own):
-        return _limits(group)
-    # A file with records of several earthquakes is cut to the chosen one
-    if any(record.path in mixed for record in own):
-        return {
-            "start": min(record.start for record in own),
-            "end": max(record.end for record in own),
-        }
-    return {}
 
 
 def largest_motion(found: SourceContents, reader: Reader, group: EventGroup) -> float:
@@ -249,20 +241,16 @@ def reader_of_event(reader: Reader, found: AgreedEvent | None) -> Reader:
     """Return a reader of stations whose records have the earthquake of most headers, if any has."""
     if found is None:
         return reader
-    _warn_of_contradictions(found)
-    if found.event is None:
-        return reader
-    return partial(read_station_of, event=found.event, **reader.keywords)
-
-
-def _warn_of_contradictions(found: AgreedEvent) -> None:
-    """Log which stations have headers of another earthquake than most, or that none has most."""
+    # Headers that contradict are for the user to judge
     others = "; ".join(f"{name}: {event}" for name, event in found.others.items())
     if others and found.event is None:
         log.warning("headers of records describe no common earthquake: %s", shortened(others))
     elif others:
         message = "%d headers describe another earthquake than the %d of most, %s: %s"
         log.warning(message, len(found.others), found.stations, found.event, shortened(others))
+    if found.event is None:
+        return reader
+    return partial(read_station_of, event=found.event, **reader.keywords)
 
 
 def _facts(group: EventGroup, screened: EventGroup, gap: float | None) -> dict[str, object]:

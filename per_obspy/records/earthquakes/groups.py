@@ -102,14 +102,16 @@ class EventGroup(NamedTuple):
 
     Attributes
     ----------
-    start : UTCDateTime or None
-        Of the earliest record, continuous ones aside; None if no record has a date.
     records : tuple of RecordSpan
-        Sorted by start.
+        The earliest first, continuous ones aside.
     """
 
-    start: UTCDateTime | None
     records: tuple[RecordSpan, ...]
+
+    @property
+    def start(self) -> UTCDateTime | None:
+        """Start of the earliest record; None if no record has a date."""
+        return self.records[0].start if self.records[0].is_dated else None
 
     @property
     def stations(self) -> int:
@@ -123,7 +125,7 @@ class EventGroup(NamedTuple):
         triggered = [record for record in dated if not record.is_continuous] or dated
         if not triggered:
             return None
-        return min(record.start for record in triggered), _end(triggered)
+        return span_of(triggered)
 
     @property
     def label(self) -> str:
@@ -174,22 +176,19 @@ def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[Event
     groups = _successive(kinds["triggered"], lambda group, one: one.start - group[0].start <= gap)
     # Records that cannot found a separate group where there is one to join
     alone = _without_group(groups, kinds["continuous"], _overlaps)
-    groups += _successive(alone, lambda group, one: one.start <= _end(group))
+    groups += _successive(alone, lambda group, one: one.start <= span_of(group)[1])
     alone = _without_group(groups, kinds["day"], _is_near)
     groups += _successive(alone, lambda group, one: one.start <= group[0].start)
     _join_folders(groups, kinds["undated"])
     groups.sort(key=lambda group: group[0].start.ns)
-    return tuple(map(_group, groups))
+    # The earliest record has founded the group
+    return tuple(EventGroup(tuple(members)) for members in groups)
 
 
-def _end(members: Iterable[RecordSpan]) -> UTCDateTime:
-    """Return the end of the last of some records."""
-    return max(member.end for member in members)
-
-
-def _group(members: Sequence[RecordSpan]) -> EventGroup:
-    """Return a group with the start of its earliest record that founded it."""
-    return EventGroup(members[0].start if members[0].is_dated else None, tuple(members))
+def span_of(records: Iterable[RecordSpan]) -> tuple[UTCDateTime, UTCDateTime]:
+    """Return the times of the first and the last sample of some records."""
+    starts, ends = zip(*((record.start, record.end) for record in records), strict=True)
+    return min(starts), max(ends)
 
 
 def chosen_group(
@@ -295,8 +294,8 @@ def _without_group(
 
 def _overlaps(group: list[RecordSpan], record: RecordSpan) -> bool:
     """Return whether a continuous record contains a part of the triggered records of a group."""
-    end = _end(member for member in group if not member.is_continuous)
-    return bool(record.start <= end and record.end >= group[0].start)
+    start, end = span_of(member for member in group if not member.is_continuous)
+    return bool(record.start <= end and record.end >= start)
 
 
 def _is_near(group: list[RecordSpan], record: RecordSpan) -> bool:
