@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -329,38 +330,39 @@ def event_content(pool: WebPool, provider: str, event_id: str) -> bytes:
 
 def _rows_of_file(path: Path) -> list[Earthquake]:
     """Return the earthquakes of a GeoJSON or QuakeML file."""
-    # Both are told apart by the first letter
     content = path.read_bytes()
-    try:
+
+    def read() -> Listed:
+        # Both are told apart by the first letter
         if content.lstrip()[:1] == b"{":
-            listed = _feed_rows(content)
-        else:
-            events = read_with_obspy(obspy.read_events, path)
-            listed = _each(earthquake_of, events, lambda event: str(event.resource_id))
-        return _rows_with_warnings(str(path), listed)
-    except (RecordRejected, ValueError, KeyError, TypeError) as error:
-        raise CatalogError(str(path), f"is no list of events: {_reason(error)}") from error
+            return _feed_rows(content)
+        events = read_with_obspy(obspy.read_events, path)
+        return _each(earthquake_of, events, lambda event: str(event.resource_id))
+
+    return _usable(str(path), read, partial(CatalogError, str(path)), "is no list of events")
 
 
 def _rows_of_answer(
     url: str, rows: Callable[[bytes], Listed], query: Mapping[str, str]
 ) -> list[Earthquake]:
     """Return the earthquakes in the answer of a service or feed."""
-    content = answer(WebPool(*_PATIENCE), url, query)
+    content, shown = answer(WebPool(*_PATIENCE), url, query), public_url(url)
+    problem = f"{shown}: answers with data other than a list of events"
+    return _usable(shown, partial(rows, content), ServiceError, problem)
+
+
+def _usable(
+    source: str, read: Callable[[], Listed], fault: Callable[[str], PerError], problem: str
+) -> list[Earthquake]:
+    """Return the earthquakes of a list; its problems are warnings, a fault if nothing else is."""
     try:
-        return _rows_with_warnings(public_url(url), rows(content))
+        rows, problems = read()
+        if problems and not rows:
+            raise ValueError(problems[0])
     except (ValueError, KeyError, TypeError) as error:
-        reason = f"answers with data other than a list of events: {_reason(error)}"
-        raise ServiceError(f"{public_url(url)}: {reason}") from error
-
-
-def _rows_with_warnings(source: str, listed: Listed) -> list[Earthquake]:
-    """Return the earthquakes of a list; its problems are warnings, an error if nothing else is."""
-    rows, problems = listed
-    if problems and not rows:
-        raise ValueError(problems[0])
-    for problem in problems:
-        log.warning("%s: left out: %s", source, problem)
+        raise fault(f"{problem}: {_reason(error)}") from error
+    for warning in problems:
+        log.warning("%s: left out: %s", source, warning)
     return rows
 
 

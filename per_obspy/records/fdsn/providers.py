@@ -103,20 +103,14 @@ def base_urls(
         if provider not in ROUTERS:
             urls[base_url(provider)] = None
             continue
+        url, fixed, understood = ROUTERS[provider]
+        parameters = fixed | {name: selection[name] for name in understood if name in selection}
         try:
-            urls |= dict.fromkeys(_routed(pool, provider, selection))
+            page = answer(pool, url, parameters).decode("utf-8", "replace")
+            urls |= dict.fromkeys(_STATION_SERVICE.findall(page))
         except ServiceError as error:
-            url = ROUTERS[provider][0]
             rejected.append(Rejection("service", provider, url, None, (str(error),)))
     return list(urls), rejected
-
-
-def _routed(pool: WebPool, router: str, selection: Mapping[str, str]) -> list[str]:
-    """Return the base URLs in the answer of a router."""
-    url, fixed, understood = ROUTERS[router]
-    parameters = {name: selection[name] for name in understood if name in selection}
-    page = answer(pool, url, fixed | parameters)
-    return _STATION_SERVICE.findall(page.decode("utf-8", "replace"))
 
 
 class Offer(NamedTuple):

@@ -13,7 +13,6 @@ from obspy.core.event import Catalog, Event, Origin
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.earthquakes.earthquake import Earthquake
-from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.earthquakes.services import (
     OTHERS,
     RECORDS_OF,
@@ -121,20 +120,17 @@ def test_files_that_are_no_list_are_wrong_input(tmp_path: Path, wrong: bytes):
         find_events(str(tmp_path / "file"), {})
 
 
-def test_an_event_without_origin_is_refused(tmp_path: Path):
-    Catalog([Event()]).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    with pytest.raises(CatalogError, match="has no origin"):
+@pytest.mark.parametrize(
+    ("origins", "reason"),
+    [
+        ([], "has no origin"),
+        ([Origin(latitude=1.0, longitude=2.0)], "an origin without time"),
+    ],
+)
+def test_an_event_without_origin_or_time_is_refused(tmp_path: Path, origins, reason: str):
+    Catalog([Event(origins=origins)]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match=reason):
         find_events(str(tmp_path / "event.xml"), {})
-
-
-def test_an_origin_without_time_is_refused(tmp_path: Path):
-    Catalog([Event(origins=[Origin(latitude=1.0, longitude=2.0)])]).write(
-        str(tmp_path / "event.xml"), format="QUAKEML"
-    )
-    with pytest.raises(CatalogError, match="an origin without time"):
-        find_events(str(tmp_path / "event.xml"), {})
-    with pytest.raises(CatalogError, match="an origin without time"):
-        read_event(tmp_path / "event.xml")
 
 
 @pytest.mark.parametrize(
