@@ -8,6 +8,7 @@ bounds neither time nor bytes in all: here a server is bounded as every service 
 
 import asyncio
 import re
+import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -133,7 +134,7 @@ async def _collect(client: "AsyncSeedLink", shown: str, pool: WebPool) -> bytes:
     """Return the records that a server sends up to its end, within the limits of a pool."""
     from seedlink_client import SeedLinkError
 
-    content = bytearray()
+    content, began = bytearray(), time.time_ns()
     try:
         async with asyncio.timeout(pool.longest):
             await client.connect()
@@ -144,7 +145,12 @@ async def _collect(client: "AsyncSeedLink", shown: str, pool: WebPool) -> bytes:
             if not await _has_station(client):
                 return b""
             async for packet in client.collect(reconnect=False):
-                content += packet.payload if packet.payload_format in _RECORDS else b""
+                if packet.payload_format not in _RECORDS:
+                    continue
+                # A server that refuses the window goes on with whatever comes
+                if packet.record().starttime > began:
+                    raise ServiceError(f"{shown}: sends records of now instead of the window")
+                content += packet.payload
                 if len(content) > pool.largest:
                     raise ServiceError(f"{shown}: sends more than {pool.largest} bytes")
             # What comes before a server hangs up may be cut; only END leaves the connection open
@@ -166,8 +172,8 @@ async def _has_station(client: "AsyncSeedLink") -> bool:
     try:
         await client.negotiate()
     except SeedLinkError as error:
-        # Version 4 refuses by a code
-        if error.code or str(error) == _REFUSED:
+        # Version 4 has a code for it; others mean that the server is busy or closed
+        if error.code == "ARGUMENTS" or str(error) == _REFUSED:
             return False
         raise
     return True

@@ -34,6 +34,8 @@ class SeedlinkServer(socketserver.ThreadingTCPServer):
         self.said: list[str] = []
         #: what is sent instead of the packets
         self.instead: Callable[[socketserver.StreamRequestHandler], None] | None = None
+        #: what is said to every station
+        self.answer = b""
         #: how the server greets
         self.greeting = GREETINGS[3]
 
@@ -74,7 +76,7 @@ class _Conversation(socketserver.StreamRequestHandler):
                 station = tuple(words[0].split("_")) if self.is_4 else (words[1], words[0])
                 known = any(packet[1][:2] == station for packet in self.server.packets)
                 refusal = b"ERROR ARGUMENTS no such station\r\n" if self.is_4 else b"ERROR\r\n"
-                self.wfile.write(b"OK\r\n" if known else refusal)
+                self.wfile.write(self.server.answer or (b"OK\r\n" if known else refusal))
             elif command == "SELECT":
                 patterns.append(_pattern(words[0].removesuffix(".D")))
                 self.wfile.write(b"OK\r\n")

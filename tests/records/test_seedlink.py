@@ -84,6 +84,27 @@ def test_an_unknown_station_has_no_records(server: SeedlinkServer):
     assert asked(server, "CI.NONE") == b""
 
 
+def test_a_busy_server_is_no_answer_of_no_data(server: SeedlinkServer):
+    server.greeting, server.answer = GREETINGS[4], b"ERROR LIMIT too many clients\r\n"
+    with pytest.raises(ServiceError, match="too many clients"):
+        asked(server)
+
+
+def test_a_server_that_passes_over_the_window_is_left(server: SeedlinkServer):
+    now = stream().select(station="CLC", channel="HNN")
+    now[0].stats.starttime = UTCDateTime() + 30
+    with seedlink(now) as live:
+        packets = live.packets
+
+    def endless(handler):
+        while True:
+            handler.wfile.write(handler.packet(1, *packets[0][:2]))
+
+    server.instead = endless
+    with pytest.raises(ServiceError, match="records of now"):
+        asked(server)
+
+
 def test_a_window_without_records_is_empty(server: SeedlinkServer):
     assert asked(server, window=(3600.0, 3700.0)) == b""
 
