@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from per_obspy.errors import Rejection
-    from per_obspy.records.event_file import EventRow
+    from per_obspy.records.earthquakes.earthquake import Earthquake
 
 #: What the table of earthquakes shows of each.
 EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
@@ -39,7 +39,7 @@ def events(
 
     Example: per-obspy events USGS --start 2019-07-06 --end 2019-07-07 --magnitude 5
     """
-    from per_obspy.records.fdsn.event_list import find_events
+    from per_obspy.records.earthquakes.services import find_events
 
     # Ask by the parameters of FDSN event services
     query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
@@ -129,7 +129,7 @@ def _require_no_options(source: str, settings: "Mapping[str, object]", folder: P
         raise CatalogError(source, problem)
 
 
-def _event_cells(row: "EventRow") -> list[object]:
+def _event_cells(row: "Earthquake") -> list[object]:
     """Return the cells of an earthquake, empty where a value is unknown."""
     depth = "" if row.depth is None else f"{row.depth:.0f}"
     magnitude = "" if row.magnitude is None else f"{row.magnitude:g} {row.magnitude_type}"

@@ -6,7 +6,7 @@ from typing import Any
 
 from per_obspy.config import Processing
 from per_obspy.processing.earthquake import Source, same_decisions, source_of
-from per_obspy.records.event_file import EventFile
+from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.spectra.storage import read_spectra, write_spectra
 
 

@@ -32,7 +32,7 @@ from per_obspy.jobs.parallel import Work, results
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.account import taken
 from per_obspy.processing.chain import process_station
-from per_obspy.records.event_file import EventFile, portable
+from per_obspy.records.earthquakes.quakeml import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
 from per_obspy.resume import Status, StatusError, changed_outputs, read_status, write_status

@@ -8,8 +8,8 @@ from per_obspy.config import Fdsn, Records, Run, checked, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
+from per_obspy.records.earthquakes.services import OTHERS, RECORDS_OF, event_of
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
-from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
 
 #: Radius around the epicentre in which stations of a named earthquake are wanted, m.
 RADIUS = 100_000.0
@@ -109,7 +109,7 @@ def fetch_event(
     Parameters
     ----------
     identifier : str
-        As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it; of the event service in
+        As :func:`per_obspy.records.earthquakes.services.event_of` takes it; of the event service in
         ``settings`` if there is one.
     folder : Path
         Cache of the fetched files; complete requests are answered from it.

@@ -19,7 +19,7 @@ from per_obspy.processing.chain import before_processing, process_instruments, p
 from per_obspy.processing.components import split_structures
 from per_obspy.processing.earthquake import Source
 from per_obspy.progress import Progress
-from per_obspy.records.event_file import read_event_file
+from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
 from per_obspy.records.sources import find_path_sources
 from per_obspy.report.records import draw_records

@@ -18,7 +18,7 @@ from per_obspy.names import inside
 from per_obspy.pipeline.results.run_facts import with_event
 from per_obspy.pipeline.results.served_stations import KnownStations
 from per_obspy.progress import Progress
-from per_obspy.records.event_file import EventFile
+from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.sources import StationSource, find_sources

@@ -174,7 +174,7 @@ def input_files(records: config.Records | None, fetched: "Fetched | None") -> li
 
 def _day_files(records: config.Records, sds: config.Sds) -> list[Path]:
     """Return the day files of an SDS archive in its window."""
-    from per_obspy.records.event_file import read_event
+    from per_obspy.records.earthquakes.quakeml import read_event
     from per_obspy.records.fdsn.request import window
     from per_obspy.records.sds import find_sds_stations
 

@@ -43,7 +43,7 @@ from per_obspy.formats.text.vocabulary import horizontal
 from per_obspy.names import code_problem
 from per_obspy.processing.instrument_response import with_overall_sensitivity
 from per_obspy.records.archive import read_file
-from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
+from per_obspy.records.earthquakes.earthquake import Earthquake, header_event
 from per_obspy.records.file_list import files_below
 from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
 from per_obspy.units import unit_of_si
@@ -90,7 +90,7 @@ class Metadata(NamedTuple):
         Of StationXML or station text.
     rows : tuple of StationRow
         Of a table of stations.
-    event : HeaderEvent or None
+    event : Earthquake or None
         The earthquake that a metadata file of ITACA has besides.
     faults : tuple of str
         Lines that cannot be read.
@@ -98,7 +98,7 @@ class Metadata(NamedTuple):
 
     inventory: Inventory | None = None
     rows: tuple[StationRow, ...] = ()
-    event: HeaderEvent | None = None
+    event: Earthquake | None = None
     faults: tuple[str, ...] = ()
 
 

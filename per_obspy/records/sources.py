@@ -25,7 +25,7 @@ from per_obspy.records.earthquakes.choice import (
     reader_of_event,
 )
 from per_obspy.records.earthquakes.groups import event_groups
-from per_obspy.records.event_file import EventFile, read_event_file
+from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
 from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, find_stations, read_station

@@ -6,6 +6,7 @@ import json
 import socket
 import sqlite3
 import tarfile
+import threading
 import zipfile
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
@@ -51,13 +52,13 @@ from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.records.asdf import find_asdf_stations, read_asdf_station
-from per_obspy.records.event_file import read_event
-from per_obspy.records.fdsn.event_list import find_events
-from per_obspy.records.fdsn.web import web_pool
+from per_obspy.records.earthquakes.quakeml import read_event
+from per_obspy.records.earthquakes.services import find_events
+from per_obspy.records.fdsn.web import WebPool
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.processed_files import write_description, write_processed
-from per_obspy.records.seedlink.seedlink_window import Conversation
+from per_obspy.records.seedlink import ServerAddress, seedlink_window
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_spectrum.design import read_design_spectrum
 
@@ -576,23 +577,31 @@ def _event(path: Path) -> Iterable[object]:
 
 def _packets() -> bytes:
     """Return all bytes of a SeedLink server, from its greeting to its end."""
-    records = _written("MSEED")[:4096]
-    packets = [b"SL%06X" % n + records[512 * n : 512 * n + 512] for n in range(len(records) // 512)]
+    content = io.BytesIO()
+    record("HN1", np.arange(2000, dtype=np.int32) ** 2).write(content, format="MSEED", reclen=512)
+    pieces = zip(*[iter(content.getvalue())] * 512, strict=True)
+    packets = [b"SL%06X" % number + bytes(piece) for number, piece in enumerate(pieces)]
     return b"SeedLink v3.1\r\nfuzz\r\nOK\r\nOK\r\nOK\r\n" + b"".join(packets) + b"END"
 
 
 def _seedlink(path: Path) -> Iterable[object]:
     """Read the bytes of a file as the answers of a SeedLink server, and the records in them."""
-    pool = web_pool(1.0, 0, 0.01, longest=2.0, largest=2**20)
-    ours, theirs = socket.socketpair()
-    # Everything is said at once, whatever is asked, and fits into the buffer of the connection
-    with ours, theirs:
-        ours.settimeout(1.0)
-        theirs.sendall(path.read_bytes()[:100_000])
-        theirs.shutdown(socket.SHUT_WR)
-        conversation = Conversation(ours, "seedlink://fuzz", pool)
-        is_there = conversation.selected("CI.CLC", [("", "HN1")], (START, START + 10.0))
-        content = b"".join(conversation.records()) if is_there else b""
+    pool = WebPool(1.0, 0, 0.01, longest=2.0, largest=2**20)
+    channels, window = [("", "HN1")], (START, START + 10.0)
+    # Everything is said at once, whatever is asked
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with connection, suppress(OSError):
+                connection.sendall(path.read_bytes()[:100_000])
+                connection.shutdown(socket.SHUT_WR)
+                while connection.recv(2**16):
+                    pass
+
+        threading.Thread(target=answer, daemon=True).start()
+        address = ServerAddress(*server.getsockname())
+        content = seedlink_window(pool, address, "CI.CLC", channels, window)
     if not content:
         return []
     stream = read_bytes_with_obspy(obspy.read, content, str(path), format="MSEED")

@@ -7,7 +7,7 @@ import pytest
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.jobs import station as jobs
 from per_obspy.jobs.station import StationJob, do_stations
-from per_obspy.records.event_file import EventFile
+from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.records.sources import find_path_sources
 from per_obspy.simulation.earthquake import simulate, write_simulation
 

@@ -12,7 +12,7 @@ from per_obspy.errors import CatalogError, Unfinished, WrongOutput
 from per_obspy.jobs import station as jobs
 from per_obspy.jobs.parallel import DIED
 from per_obspy.jobs.station import StationJob, do_stations, earlier_station
-from per_obspy.records.event_file import read_event_file
+from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.folder import read_station
 from per_obspy.records.sources import find_path_sources
 from per_obspy.simulation.earthquake import simulate, write_simulation

@@ -101,7 +101,7 @@ def test_each_service_is_asked_by_its_own_identifier(identifier, host, tmp_path,
         asked.append((url, dict(parameters)))
         return b""
 
-    monkeypatch.setattr("per_obspy.records.fdsn.event_list.answer", answer)
+    monkeypatch.setattr("per_obspy.records.earthquakes.services.answer", answer)
     with pytest.raises(CatalogError, match="has no event"):
         fetch_event(identifier, tmp_path)
     name = identifier.rpartition(":")[2]

@@ -20,7 +20,7 @@ from per_obspy.records.asdf import (
     is_asdf,
     read_asdf_station,
 )
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.metadata import metadata_text
 from per_obspy.simulation.earthquake import Simulation, simulate
 

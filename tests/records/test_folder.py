@@ -18,7 +18,7 @@ from per_obspy.errors import CatalogError, NothingUsable, TryLater
 from per_obspy.formats.peer_at2 import write_at2
 from per_obspy.processing.chain import process_station
 from per_obspy.records import file_list
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.file_list import changed_files, file_states, growing_files
 from per_obspy.records.folder import find_stations, one_series, read_station
 

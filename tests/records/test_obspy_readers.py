@@ -20,7 +20,7 @@ from station_files import record
 from per_obspy.errors import RecordRejected
 from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.folder import find_stations
 from per_obspy.records.metadata import read_inventories
 from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy

@@ -17,7 +17,7 @@ from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.file_list import input_files
 from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed

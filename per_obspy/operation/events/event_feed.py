@@ -13,15 +13,15 @@ from per_obspy.files import is_part
 from per_obspy.names import public_url
 from per_obspy.operation.events.relevance import Circle
 from per_obspy.operation.events.state import WatchState, iso, moment
-from per_obspy.records.earthquakes.quakeml_events import (
+from per_obspy.records.earthquakes.earthquake import Earthquake
+from per_obspy.records.earthquakes.quakeml import (
+    earthquake_of,
     events_of,
     plain_quakeml,
-    quakeml_rows,
     read_quakeml,
 )
-from per_obspy.records.event_file import EventRow, quakeml_row, row_problem
-from per_obspy.records.fdsn.event_list import event_content, listed_events
-from per_obspy.records.fdsn.web import WebPool, web_pool
+from per_obspy.records.earthquakes.services import event_content, listed_events
+from per_obspy.records.fdsn.web import WebPool
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +61,7 @@ class Feed(NamedTuple):
         Of a folder: name of a file -> size and time of change, as they were read.
     """
 
-    rows: dict[str, EventRow]
+    rows: dict[str, Earthquake]
     files: dict[str, str]
     problems: tuple[str, ...]
     seen: dict[str, tuple[int, int]]
@@ -104,7 +104,7 @@ def read_feed(watch: Watch, state: WatchState, circle: Circle, now: datetime) ->
 
 def _pool() -> WebPool:
     """Return the connection pool for an event service."""
-    return web_pool(*_PATIENCE)._replace(longest_pause=_LONGEST_PAUSE)
+    return WebPool(*_PATIENCE, longest_pause=_LONGEST_PAUSE)
 
 
 def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
@@ -133,7 +133,7 @@ def _since(watch: Watch, state: WatchState, now: datetime) -> str | None:
 
 def _listed_since(
     pool: WebPool, watch: Watch, query: Mapping[str, str], since: str
-) -> tuple[list[EventRow], list[str]]:
+) -> tuple[list[Earthquake], list[str]]:
     """Return the earthquakes changed since a time; all if the service lacks that parameter."""
     try:
         return _listed(pool, watch, {**query, "updatedafter": since})
@@ -146,7 +146,7 @@ def _listed_since(
 
 def _listed(
     pool: WebPool, watch: Watch, query: Mapping[str, str]
-) -> tuple[list[EventRow], list[str]]:
+) -> tuple[list[Earthquake], list[str]]:
     """Return the listed earthquakes; beyond the limit of a list also all strong enough ones."""
     service = watch.service or ""
     rows, problems = listed_events(pool, service, query)
@@ -174,15 +174,15 @@ def _folder_feed(folder: Path, seen: Mapping[str, tuple[int, int]]) -> Feed:
             continue
         mark = (facts.st_size, facts.st_mtime_ns)
         try:
-            rows, faults = quakeml_rows(path) if seen.get(path.name) != mark else ({}, [])
+            events, faults = read_quakeml(path) if seen.get(path.name) != mark else ({}, [])
         except CatalogError as error:
             # One that is being written is read at the next poll
             if time.time() - facts.st_mtime >= SETTLED:
                 problems.append(f"{path.name}: {error.problem}")
             continue
         problems += faults
-        feed.rows.update(rows)
-        feed.files.update(dict.fromkeys(rows, path.name))
+        feed.rows.update({name: earthquake_of(event) for name, event in events.items()})
+        feed.files.update(dict.fromkeys(events, path.name))
         feed.seen[path.name] = mark
     return feed._replace(problems=tuple(problems))
 
@@ -202,13 +202,13 @@ class PresentEvent(NamedTuple):
 
     Attributes
     ----------
-    row : EventRow
+    row : Earthquake
         Its facts.
     quakeml : bytes
         QuakeML with time, place and magnitude alone.
     """
 
-    row: EventRow
+    row: Earthquake
     quakeml: bytes
 
 
@@ -242,8 +242,8 @@ def present_event(watch: Watch, event_id: str, file: str, time: str) -> PresentE
         event = read_quakeml(path)[0].get(event_id) if path.is_file() else None
     if event is None:
         return None
-    row = quakeml_row(event)._replace(event_id=event_id)
-    if problem := row_problem(row):
+    row = earthquake_of(event)._replace(event_id=event_id)
+    if problem := row.fault:
         raise CatalogError(shortened(event_id, 80), problem)
     # An update moves an origin by seconds
     if abs((moment(row.time) - moment(time)).total_seconds()) > OTHER_EVENT:
@@ -261,7 +261,7 @@ def _event_of_service(service: str, event_id: str) -> Any:
     source = public_url(service)
     try:
         (event,) = events_of(content, source)
-        quakeml_row(event)
+        earthquake_of(event)
     except (RecordRejected, ValueError) as error:
         reason = f"{source}: answer is not the earthquake {event_id}: {error}"
         raise ServiceError(reason) from error

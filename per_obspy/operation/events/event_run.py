@@ -99,7 +99,7 @@ def _run_with_records(
     passed = [delay for delay in watch.delays if delay <= task.delay]
     done = {**state.done, **{f"{delay:g}": started for delay in passed}}
     state = changed(state, changed=False, complete=complete, done=done, arrivals=arrivals)
-    missing = has_missing(settings, fetched)
+    missing = has_missing(fetched)
     state = changed(state, fetched=records_hash(fetched), missing=missing)
     # The number is in the page and the summary
     if not _has_records(settings, fetched):

@@ -25,8 +25,8 @@ from per_obspy.operation.events.state import (
     write_watch_state,
 )
 from per_obspy.progress import Progress
-from per_obspy.records.fdsn.cache import FDSN, Fetched, cached_hashes, fetch
-from per_obspy.records.fdsn.cut_records import SUFFIX, cut_records_aside, has_cut_records
+from per_obspy.records.fdsn.cache import FDSN, Fetched, cached_hashes, fetch, has_cut_records
+from per_obspy.records.fdsn.download import RECORDS
 from per_obspy.records.fdsn.web import PassingFault
 
 #: Requests for missing records between two runs, per time since the origin: the later, the rarer.
@@ -55,10 +55,8 @@ def fetched_for(watcher: Watcher, settings: Run) -> Fetched | None:
         return None
     with _pauses(watcher.folder, watcher.now()) as pauses:
         try:
-            with cut_records_aside(request):
-                fetched = fetch(request, event, watcher.progress, True, pauses)
+            fetched = fetch(request, event, watcher.progress, True, pauses, cut=True)
         except ServiceError:
-            # With the records that were set aside at their place
             fetched = _fetched_before(request, event, watcher.progress, pauses)
     return _without_restored(fetched)
 
@@ -80,7 +78,7 @@ def _without_restored(fetched: Fetched) -> Fetched:
     missing = tuple(
         row
         for row in fetched.rejected
-        if row.source != FDSN or not (fetched.folder / f"{row.name}{SUFFIX}").is_file()
+        if row.source != FDSN or not (fetched.folder / f"{row.name}{RECORDS}").is_file()
     )
     return fetched._replace(rejected=missing)
 
@@ -110,17 +108,15 @@ def records_hash(fetched: Fetched | None) -> str:
     if fetched is None:
         return ""
     hashes = cached_hashes(fetched.folder)
-    return content_hash({name: known for name, known in hashes.items() if name.endswith(SUFFIX)})
+    return content_hash({name: known for name, known in hashes.items() if name.endswith(RECORDS)})
 
 
-def has_missing(settings: Run, fetched: Fetched | None) -> bool:
+def has_missing(fetched: Fetched | None) -> bool:
     """Return whether a station that a service lists has no records, or incomplete ones."""
     if fetched is None:
         return False
-    assert settings.records is not None
-    assert settings.records.fdsn is not None
     is_without = any(row.source == FDSN for row in fetched.rejected)
-    return is_without or has_cut_records(settings.records.fdsn)
+    return is_without or has_cut_records(fetched)
 
 
 def is_look_due(watcher: Watcher, state: EventState) -> bool:

@@ -13,7 +13,7 @@ from per_obspy.files import content_hash
 from per_obspy.operation.events.event_feed import Feed, present_event
 from per_obspy.operation.events.relevance import Places, distances, matters
 from per_obspy.operation.events.state import EventState, changed, iso, moment
-from per_obspy.records.event_file import EventRow
+from per_obspy.records.earthquakes.earthquake import Earthquake
 
 log = logging.getLogger(__name__)
 
@@ -30,12 +30,12 @@ DELETED = "deleted at its source"
 class Listed(NamedTuple):
     """Listed earthquake, reason for which it is irrelevant (empty if relevant), and its file."""
 
-    row: EventRow
+    row: Earthquake
     reason: str
     file: str
 
 
-def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
+def judged(watch: Watch, places: Places, rows: list[Earthquake]) -> list[str]:
     """
     Return the reason for which each earthquake is irrelevant; empty for relevant ones.
 
@@ -45,7 +45,7 @@ def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
         With the table of magnitudes; one that is unknown is assumed.
     places : Places
         Of the inventory.
-    rows : list of EventRow
+    rows : list of Earthquake
         Facts of the earthquakes.
     """
     longitude = np.array([row.longitude for row in rows], dtype=np.float64)
@@ -56,7 +56,7 @@ def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
     ]
 
 
-def _reason(watch: Watch, row: EventRow, distance: float) -> str:
+def _reason(watch: Watch, row: Earthquake, distance: float) -> str:
     """Return the reason for which an earthquake at a distance is irrelevant; empty if relevant."""
     magnitude = watch.assumed_magnitude if row.magnitude is None else row.magnitude
     if matters(watch.magnitudes, distance, magnitude):
@@ -65,7 +65,7 @@ def _reason(watch: Watch, row: EventRow, distance: float) -> str:
     return f"{known} {magnitude:g} at {distance / 1000:.0f} km does not matter (watch.magnitudes)"
 
 
-def with_facts(state: EventState, row: EventRow) -> EventState:
+def with_facts(state: EventState, row: Earthquake) -> EventState:
     """Return the state of an earthquake with new facts, under its own identifier."""
     facts = {**row._asdict(), "event_id": state.event_id}
     return changed(state, **facts, magnitude_assumed=row.magnitude is None)
@@ -173,7 +173,7 @@ def ignored_events(
     return dict(list(ignored.items())[-MOST_IGNORED:])
 
 
-def _digest(row: EventRow) -> str:
+def _digest(row: Earthquake) -> str:
     """Return a hash of the facts of an earthquake by which it counts as changed."""
     return content_hash({name: getattr(row, name) for name in FACTS})[:16]
 
@@ -213,20 +213,20 @@ def _updated(known: EventState, listed: Listed, now: datetime) -> EventState | N
     )
 
 
-def _change(known: EventState, row: EventRow) -> str:
+def _change(known: EventState, row: Earthquake) -> str:
     """Describe the return or change of a known earthquake."""
     if known.state == "closed":
         return f"opened again, {in_words(row)}"
     return f"updated, {in_words(row)}, before: {in_words(known.facts)}"
 
 
-def in_words(row: EventRow) -> str:
+def in_words(row: Earthquake) -> str:
     """
     Return magnitude, place and time of an earthquake in words.
 
     Examples
     --------
-    >>> in_words(EventRow("x", "2026-11-23T01:00:00", 14.6, -90.5, None, None, "", "Guatemala"))
+    >>> in_words(Earthquake("x", "2026-11-23T01:00:00", 14.6, -90.5, None, None, "", "Guatemala"))
     'magnitude unknown, 14.600 -90.500 Guatemala, 2026-11-23T01:00:00'
     """
     size = "unknown" if row.magnitude is None else f"{row.magnitude:g}"

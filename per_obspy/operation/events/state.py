@@ -17,8 +17,8 @@ from per_obspy.config.section import Moment, Section
 from per_obspy.errors import CatalogError, reason_of, shortened
 from per_obspy.files import written_whole
 from per_obspy.names import inside
-from per_obspy.records.event_file import EventRow
-from per_obspy.records.fdsn.event_list import file_name
+from per_obspy.records.earthquakes.earthquake import Earthquake
+from per_obspy.records.earthquakes.quakeml import file_name
 
 #: State files of a watched folder and of an earthquake.
 WATCH, EVENT = "watch.json", "event.json"
@@ -119,10 +119,10 @@ class EventState(_State):
     last_error: str | None = None
 
     @property
-    def facts(self) -> EventRow:
+    def facts(self) -> Earthquake:
         """Facts of the earthquake in the form of a list."""
-        values = {name: getattr(self, name) for name in EventRow._fields}
-        return EventRow(**values)
+        values = {name: getattr(self, name) for name in Earthquake._fields}
+        return Earthquake(**values)
 
 
 class WatchState(_State):

@@ -230,7 +230,7 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
 def _fdsn_content(identifier: str, cache: Path) -> dict[str, Any]:
     """Return the section ``[records.fdsn]`` for the identifier of an earthquake."""
     from per_obspy.pipeline.fetch import CHANNELS
-    from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
+    from per_obspy.records.earthquakes.services import OTHERS, RECORDS_OF, event_of
 
     provider, event = event_of(identifier)
     return {

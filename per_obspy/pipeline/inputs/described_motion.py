@@ -12,7 +12,7 @@ from per_obspy.errors import CatalogError, Rejection
 from per_obspy.formats.text.station_table import is_station_table, read_station_table
 from per_obspy.pipeline.inputs.facts import Facts, Places, some, span, unzipped
 from per_obspy.pipeline.inputs.input_kinds import Kind
-from per_obspy.records.event_file import read_event
+from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.metadata import read_inventories
 from per_obspy.records.shakemap import is_scenario, read_shakemap
 from per_obspy.records.summary import RecordInfo

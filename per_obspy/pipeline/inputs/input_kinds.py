@@ -97,7 +97,7 @@ def kind_of(argument: str | Path) -> Kind:
             return _file_kind(path)
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
-    from per_obspy.records.fdsn.event_ids import is_event_id
+    from per_obspy.records.earthquakes.services import is_event_id
 
     if is_event_id(str(argument)):
         return Kind.EVENT_ID

@@ -1,7 +1,7 @@
 """Choose the one earthquake of a folder that is screened, and reject the records of others."""
 
 import logging
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +14,12 @@ from obspy.core.event import Event
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.records.archive import LIMITS
+from per_obspy.records.earthquakes.earthquake import (
+    AgreedEvent,
+    Earthquake,
+    agreed_event,
+    origin_of,
+)
 from per_obspy.records.earthquakes.groups import (
     GAP,
     HOURS,
@@ -25,9 +31,9 @@ from per_obspy.records.earthquakes.groups import (
     event_groups,
     follows,
     joining_gap,
+    span_of,
     station_files,
 )
-from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
 from per_obspy.records.folder import SourceContents, read_station
 
 log = logging.getLogger(__name__)
@@ -50,7 +56,7 @@ class OneEarthquake(NamedTuple):
     earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
         (records without a date that are taken for this earthquake), ``screened``, ``headers``: the
-        earthquake by the headers of its records, see ``earthquakes.header_event``; and
+        earthquake by the headers of its records, see ``earthquakes.earthquake``; and
         ``joined_by``: the ``records.event_gap``, s, that takes a group for the screened earthquake,
         from which it may differ by its clocks only; else None.
     """
@@ -79,24 +85,24 @@ def one_earthquake(
     CatalogError
         If no record is of the configured time or the origin time.
     """
-    groups = event_groups(found.records, records.event_gap)
-    time, source = _time(records, event)
-    reader = _reader(records.archives)
+    gap, (time, source) = records.event_gap, _time(records, event)
+    groups = event_groups(found.records, gap)
+    reader: Reader = partial(read_station)
+    if records.archives != LIMITS:
+        reader = partial(read_station, limits=records.archives)
     motion = partial(largest_motion, found, reader)
-    group = chosen_group(groups, time, source, motion, records.event_gap)
+    group = chosen_group(groups, time, source, motion, gap)
     alike = differ_by_clocks(groups, group)
-    gap = joining_gap([group, *alike])
-    facts = [_facts(other, group, gap if other in alike else None) for other in groups]
+    joined = joining_gap([group, *alike])
+    facts = [_facts(other, group, joined if other in alike else None) for other in groups]
     # Without an event of the configuration that of the headers counts
     if event is None:
-        reader = reader_of_event(reader, group_event(group, records.event_gap))
+        reader = reader_of_event(reader, group_event(group, gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
-    rejected = (*found.rejected, *_rejections(others, group, alike))
-    mixed = {record.path for record in others}
-    found = found._replace(rejected=rejected)
-    return OneEarthquake(_contents(found, group, mixed, reader), facts)
+    found = found._replace(rejected=(*found.rejected, *_rejections(others, group, alike)))
+    return OneEarthquake(_contents(found, group, {record.path for record in others}, reader), facts)
 
 
 def read_station_of(
@@ -104,7 +110,7 @@ def read_station_of(
     inventory: Inventory | None,
     station: str | None = None,
     *,
-    event: HeaderEvent,
+    event: Earthquake,
     **options: Any,
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
@@ -114,7 +120,7 @@ def read_station_of(
     ----------
     paths, inventory, station, **options
         As for ``read_station``.
-    event : HeaderEvent
+    event : Earthquake
         Takes the place of ``stats.event`` of every trace.
     """
     stream, rejected = read_station(paths, inventory, station, **options)
@@ -123,42 +129,28 @@ def read_station_of(
     return stream, rejected
 
 
-def _reader(limits: config.Archives) -> Reader:
-    """Return the reader of a folder's stations, with limits of archives that are no default."""
-    return partial(read_station) if limits == LIMITS else partial(read_station, limits=limits)
-
-
 def _contents(
-    found: SourceContents, group: EventGroup, mixed: Container[Path], reader: Reader
+    found: SourceContents, group: EventGroup, mixed: set[Path], reader: Reader
 ) -> tuple[tuple[SourceContents, Reader], ...]:
     """Return the stations of a group with their readers; the first contents have rejections."""
-    # Stations of which only a window is read have a separate reader
     whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
     for station, paths in station_files(group.records).items():
-        limits = _station_limits(station, group, mixed)
+        own = [record for record in group.records if record.station == station]
+        limits = dict[str, UTCDateTime]()
+        # Hours of record are cut to the time of the triggered records of all stations
+        if any(record.end - record.start > HOURS for record in own):
+            limits = _limits(group)
+        # A file with records of several earthquakes is cut to the chosen one
+        elif not mixed.isdisjoint(paths):
+            start, end = span_of(own)
+            limits = {"start": start, "end": end}
+        # Stations of which only a window is read have a separate reader
         if limits:
             part = found._replace(stations={station: paths}, rejected=())
             windows.append((part, partial(reader, **limits)))
         else:
             whole[station] = paths
     return (found._replace(stations=whole), reader), *windows
-
-
-def _station_limits(
-    station: str, group: EventGroup, mixed: Container[Path]
-) -> dict[str, UTCDateTime]:
-    """Return the window to read of a station's files; empty if they are read whole."""
-    own = [record for record in group.records if record.station == station]
-    # Hours of record are cut to the time of the triggered records of all stations
-    if any(record.end - record.start > HOURS for record in own):
-        return _limits(group)
-    # A file with records of several earthquakes is cut to the chosen one
-    if any(record.path in mixed for record in own):
-        return {
-            "start": min(record.start for record in own),
-            "end": max(record.end for record in own),
-        }
-    return {}
 
 
 def largest_motion(found: SourceContents, reader: Reader, group: EventGroup) -> float:
@@ -176,19 +168,13 @@ def peak_motion(trace: Trace) -> tuple[float, str]:
     """Return the largest distance from the mean and its unit; of raw counts by the sensitivity."""
     if not trace.stats.npts:
         return 0.0, ""
-    scale, unit = _scale(trace)
+    stats, scale = trace.stats, 1.0
+    if stats.units == "counts":
+        has_response = "response" in stats
+        scale = 1.0 / stats.response.instrument_sensitivity.value if has_response else stats.calib
+    unit = _UNITS[stats.quantity] if stats.units == "counts" else stats.units
     # Raw records have an offset
     return float(np.abs(trace.data - trace.data.mean()).max()) * scale, unit
-
-
-def _scale(trace: Trace) -> tuple[float, str]:
-    """Return the factor from samples to SI, and the unit it leads to."""
-    stats = trace.stats
-    if stats.units != "counts":
-        return 1.0, stats.units
-    if "response" in stats:
-        return 1.0 / stats.response.instrument_sensitivity.value, _UNITS[stats.quantity]
-    return stats.calib, _UNITS[stats.quantity]
 
 
 def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | None, str]:
@@ -197,8 +183,7 @@ def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | N
         return UTCDateTime(records.time), "records.time"
     if event is None:
         return None, ""
-    origin = event.preferred_origin() or event.origins[0]
-    return origin.time, "records.event"
+    return origin_of(event).time, "records.event"
 
 
 def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
@@ -256,20 +241,16 @@ def reader_of_event(reader: Reader, found: AgreedEvent | None) -> Reader:
     """Return a reader of stations whose records have the earthquake of most headers, if any has."""
     if found is None:
         return reader
-    _warn_of_contradictions(found)
-    if found.event is None:
-        return reader
-    return partial(read_station_of, event=found.event, **reader.keywords)
-
-
-def _warn_of_contradictions(found: AgreedEvent) -> None:
-    """Log which stations have headers of another earthquake than most, or that none has most."""
+    # Headers that contradict are for the user to judge
     others = "; ".join(f"{name}: {event}" for name, event in found.others.items())
     if others and found.event is None:
         log.warning("headers of records describe no common earthquake: %s", shortened(others))
     elif others:
         message = "%d headers describe another earthquake than the %d of most, %s: %s"
         log.warning(message, len(found.others), found.stations, found.event, shortened(others))
+    if found.event is None:
+        return reader
+    return partial(read_station_of, event=found.event, **reader.keywords)
 
 
 def _facts(group: EventGroup, screened: EventGroup, gap: float | None) -> dict[str, object]:

@@ -17,18 +17,14 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from obspy import Trace, UTCDateTime
 
 from per_obspy.constants import UNSET_DAYS
 from per_obspy.errors import CatalogError
 from per_obspy.formats.knet import knet_event
-from per_obspy.records.earthquakes.header_event import (
-    HeaderEvent,
-    header_event,
-    same_earthquake,
-)
+from per_obspy.records.earthquakes.earthquake import Earthquake, header_event, same_earthquake
 
 #: Longest time from the first start of a group to the last, s.
 GAP = 300.0
@@ -41,6 +37,13 @@ CONTINUOUS = 600.0
 HOURS, MARGIN = 3600.0, 60.0
 
 _DAY = 86400.0
+
+#: Kinds of records: with a time that an earthquake triggered or without end, with a day alone,
+#: or without a date.
+Kind = Literal["triggered", "continuous", "day", "undated"]
+
+#: Tells whether a record joins the records of a group.
+Fits = Callable[["list[RecordSpan]", "RecordSpan"], bool]
 
 
 class RecordSpan(NamedTuple):
@@ -57,7 +60,7 @@ class RecordSpan(NamedTuple):
         Its file.
     start, end : UTCDateTime
         Of the first and the last sample.
-    event : HeaderEvent or None
+    event : Earthquake or None
         The earthquake by the record's header.
     """
 
@@ -66,7 +69,7 @@ class RecordSpan(NamedTuple):
     path: Path
     start: UTCDateTime
     end: UTCDateTime
-    event: HeaderEvent | None = None
+    event: Earthquake | None = None
 
     @property
     def key(self) -> tuple[str, str, int, int]:
@@ -79,14 +82,18 @@ class RecordSpan(NamedTuple):
         return (self.start.year, self.start.month, self.start.day) not in UNSET_DAYS
 
     @property
-    def has_time(self) -> bool:
-        """Whether the time of the record is known, not only its day."""
-        return self.is_dated and bool(self.start.ns % int(_DAY * 1e9) or self.is_continuous)
-
-    @property
     def is_continuous(self) -> bool:
         """Whether the record is too long for one that an earthquake triggered."""
         return bool(self.end - self.start > CONTINUOUS)
+
+    @property
+    def kind(self) -> Kind:
+        """What the times of the record say of its earthquake."""
+        if not self.is_dated:
+            return "undated"
+        if self.is_continuous:
+            return "continuous"
+        return "triggered" if self.start.ns % int(_DAY * 1e9) else "day"
 
 
 class EventGroup(NamedTuple):
@@ -95,14 +102,16 @@ class EventGroup(NamedTuple):
 
     Attributes
     ----------
-    start : UTCDateTime or None
-        Of the earliest record, continuous ones aside; None if no record has a date.
     records : tuple of RecordSpan
-        Sorted by start.
+        The earliest first, continuous ones aside.
     """
 
-    start: UTCDateTime | None
     records: tuple[RecordSpan, ...]
+
+    @property
+    def start(self) -> UTCDateTime | None:
+        """Start of the earliest record; None if no record has a date."""
+        return self.records[0].start if self.records[0].is_dated else None
 
     @property
     def stations(self) -> int:
@@ -116,8 +125,7 @@ class EventGroup(NamedTuple):
         triggered = [record for record in dated if not record.is_continuous] or dated
         if not triggered:
             return None
-        first = min(record.start for record in triggered)
-        return first, max(record.end for record in triggered)
+        return span_of(triggered)
 
     @property
     def label(self) -> str:
@@ -161,17 +169,26 @@ def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[Event
     tuple of EventGroup
         By start. Every record is in a group, a continuous one perhaps in several.
     """
-    known = sorted(records, key=lambda record: (record.start.ns, record.record, str(record.path)))
-    triggered = [record for record in known if record.has_time and not record.is_continuous]
-    groups = _started_together(triggered, gap)
+    # Each kind by start
+    kinds: dict[Kind, list[RecordSpan]] = defaultdict(list)
+    for record in sorted(records, key=lambda one: (one.start.ns, one.record, str(one.path))):
+        kinds[record.kind].append(record)
+    groups = _successive(kinds["triggered"], lambda group, one: one.start - group[0].start <= gap)
     # Records that cannot found a separate group where there is one to join
-    continuous = [record for record in known if record.is_dated and record.is_continuous]
-    groups += _overlapping_together(_without_group(groups, continuous, _overlapping))
-    days = [record for record in known if record.is_dated and not record.has_time]
-    groups += _started_together(_without_group(groups, days, _near), 0.0)
-    _join_folders(groups, [record for record in known if not record.is_dated])
+    alone = _without_group(groups, kinds["continuous"], _overlaps)
+    groups += _successive(alone, lambda group, one: one.start <= span_of(group)[1])
+    alone = _without_group(groups, kinds["day"], _is_near)
+    groups += _successive(alone, lambda group, one: one.start <= group[0].start)
+    _join_folders(groups, kinds["undated"])
     groups.sort(key=lambda group: group[0].start.ns)
-    return tuple(_group(members) for members in groups)
+    # The earliest record has founded the group
+    return tuple(EventGroup(tuple(members)) for members in groups)
+
+
+def span_of(records: Iterable[RecordSpan]) -> tuple[UTCDateTime, UTCDateTime]:
+    """Return the times of the first and the last sample of some records."""
+    starts, ends = zip(*((record.start, record.end) for record in records), strict=True)
+    return min(starts), max(ends)
 
 
 def chosen_group(
@@ -230,7 +247,7 @@ def differ_by_clocks(groups: Sequence[EventGroup], screened: EventGroup) -> list
         if group is screened or not group.start or not screened.start:
             continue
         # A time in a header is that of its clock
-        others = [record.event._replace(time=None) for record in group.records if record.event]
+        others = [record.event._replace(time="") for record in group.records if record.event]
         is_apart = stations.isdisjoint(record.station for record in group.records)
         is_near = abs(group.start - screened.start) <= _DAY
         fits = all(same_earthquake(one, other) for one in events for other in others)
@@ -245,11 +262,11 @@ def joining_gap(groups: Sequence[EventGroup]) -> float:
     return 100.0 * math.ceil(float(max(starts) - min(starts)) / 100.0) if starts else 0.0
 
 
-def _started_together(records: Sequence[RecordSpan], gap: float) -> list[list[RecordSpan]]:
-    """Return groups of records, sorted by start, that start within the gap of their first."""
+def _successive(records: Sequence[RecordSpan], joins: Fits) -> list[list[RecordSpan]]:
+    """Return groups of records, sorted by start, each of which joins the group before it."""
     groups: list[list[RecordSpan]] = []
     for record in records:
-        if groups and record.start - groups[-1][0].start <= gap:
+        if groups and joins(groups[-1], record):
             groups[-1].append(record)
         else:
             groups.append([record])
@@ -259,14 +276,14 @@ def _started_together(records: Sequence[RecordSpan], gap: float) -> list[list[Re
 def _without_group(
     groups: list[list[RecordSpan]],
     records: Sequence[RecordSpan],
-    fits: Callable[[list[RecordSpan], RecordSpan], bool],
+    fits: Fits,
 ) -> list[RecordSpan]:
     """Add records to the groups that they fit, and return those that fit none."""
     without: list[RecordSpan] = []
     for record in records:
         fitting = [group for group in groups if fits(group, record)]
         # A day may hold several earthquakes, of which only one has the record
-        if fitting and not record.has_time:
+        if fitting and record.kind == "day":
             fitting = [max(fitting, key=lambda group: len({member.station for member in group}))]
         for group in fitting:
             group.append(record)
@@ -275,24 +292,13 @@ def _without_group(
     return without
 
 
-def _overlapping_together(records: Sequence[RecordSpan]) -> list[list[RecordSpan]]:
-    """Return groups of continuous records, sorted by start, that overlap."""
-    groups: list[list[RecordSpan]] = []
-    for record in records:
-        if groups and record.start <= max(member.end for member in groups[-1]):
-            groups[-1].append(record)
-        else:
-            groups.append([record])
-    return groups
-
-
-def _overlapping(group: list[RecordSpan], record: RecordSpan) -> bool:
+def _overlaps(group: list[RecordSpan], record: RecordSpan) -> bool:
     """Return whether a continuous record contains a part of the triggered records of a group."""
-    start, end = group[0].start, max(member.end for member in group if not member.is_continuous)
+    start, end = span_of(member for member in group if not member.is_continuous)
     return bool(record.start <= end and record.end >= start)
 
 
-def _near(group: list[RecordSpan], record: RecordSpan) -> bool:
+def _is_near(group: list[RecordSpan], record: RecordSpan) -> bool:
     """Return whether a group may be of the day of a record that starts at midnight."""
     return bool(-0.5 * _DAY <= group[0].start - record.start <= 1.5 * _DAY)
 
@@ -304,10 +310,9 @@ def _join_folders(groups: list[list[RecordSpan]], undated: Sequence[RecordSpan])
         in_folder = [count[record.path.parent] for count in counts]
         # Without a located group in their folder they join whichever group is screened
         most = max(in_folder, default=0)
-        for count, group in zip(in_folder, groups, strict=True):
-            # The first of those that have most; all where none has any
-            if count == most and (most == 0 or group is groups[in_folder.index(most)]):
-                group.append(record)
+        joined = [groups[in_folder.index(most)]] if most else groups
+        for group in joined:
+            group.append(record)
     if undated and not groups:
         groups.append(list(undated))
 
@@ -317,18 +322,12 @@ def _folder_counts(group: Sequence[RecordSpan]) -> Counter[Path]:
     return Counter(record.path.parent for record in group)
 
 
-def _group(members: Sequence[RecordSpan]) -> EventGroup:
-    """Return a group with the start of its earliest record that founded it."""
-    first = members[0]
-    return EventGroup(first.start if first.is_dated else None, tuple(members))
-
-
 def follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
     """Return whether a group's records contain a time or start within a gap, s, after it."""
     window = group.window
     if window is None:
         return True
     # The day of records without a time begins and ends in whichever zone
-    is_timed = any(record.has_time for record in group.records)
+    is_timed = any(record.kind in ("triggered", "continuous") for record in group.records)
     before, after = (gap, 0.0) if is_timed else (0.5 * _DAY, 1.5 * _DAY)
     return bool(window[0] - before <= time <= window[1] + after)

@@ -1,23 +1,25 @@
 """
-Download of one station: records and metadata from the first of several FDSN services.
+Download of one station: records and metadata from the first of several services.
 
 Time, station and channel of every answer are compared with the request.
 """
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
 import obspy
-from obspy import Inventory, Stream
+from obspy import Inventory, Stream, UTCDateTime
 from obspy.io.mseed.util import get_record_information
 
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import inside, public_url
+from per_obspy.records.fdsn.providers import Offer
 from per_obspy.records.fdsn.request import (
     Wanted,
     asked_for,
@@ -32,32 +34,18 @@ from per_obspy.records.fdsn.web import (
     WebPool,
     answer,
     host,
-    whole_answer,
+    steady_answer,
 )
 from per_obspy.records.folder import station_name
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
-from per_obspy.records.seedlink.seedlink_window import seedlink_window
-from per_obspy.records.seedlink.server_address import ServerAddress
+from per_obspy.records.seedlink import ServerAddress, seedlink_window
 from per_obspy.resume import Status, StatusError, hash_if_readable, read_status, write_status
 
-#: Times that an answer without an announced end is compared with the next.
-_COMPARISONS = 3
+#: Suffixes of records and metadata of a station in the cache.
+RECORDS, METADATA = ".mseed", ".xml"
 
-
-class Offer(NamedTuple):
-    """
-    The channels of a station that a service lists.
-
-    Attributes
-    ----------
-    base : str
-        Base URL of the service.
-    channels : tuple of (str, str)
-        Location and channel codes.
-    """
-
-    base: str
-    channels: tuple[tuple[str, str], ...]
+#: Records that end this long before their window may be continued at their service, s.
+CUT = 5.0
 
 
 class Outcome(NamedTuple):
@@ -79,67 +67,6 @@ class Outcome(NamedTuple):
     lasting: bool
 
 
-def fetch_station(
-    pool: WebPool,
-    wanted: Wanted,
-    folder: Path,
-    station: str,
-    offers: list[Offer],
-    live: Sequence[ServerAddress] = (),
-) -> Outcome:
-    """
-    Download a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``.
-
-    A file that is as it was fetched is not requested again; ``NET.STA.json`` has the hashes of both
-    and the channels that were asked for.
-
-    Parameters
-    ----------
-    pool : WebPool
-        From :func:`per_obspy.records.fdsn.web.web_pool`.
-    wanted : Wanted
-        Window and codes.
-    folder : Path
-        Of the cache.
-    station : str
-        ``"NET.STA"``.
-    offers : list of Offer
-        In order of preference.
-    live : sequence of ServerAddress
-        SeedLink servers, which are asked for records that no service has.
-    """
-    reasons, lasting = [], True
-    # The next service is tried only where one fails
-    for offer in offers:
-        try:
-            _fetch_records(pool, wanted, inside(folder, f"{station}.mseed"), offer)
-            _fetch_metadata(pool, wanted, inside(folder, f"{station}.xml"), offer)
-        except _NoData as refusal:
-            reasons.append(str(refusal))
-        except (ServiceError, RecordRejected) as fault:
-            reasons.append(str(fault))
-            lasting = False
-        else:
-            return Outcome(station, (), lasting=True)
-    # Minutes after an earthquake archives may lack data that servers of real-time data have
-    for server, offer in product(live, offers):
-        try:
-            _fetch_live(pool, wanted, inside(folder, f"{station}.mseed"), offer, server)
-            _fetch_metadata(pool, wanted, inside(folder, f"{station}.xml"), offer)
-        except _NoData as refusal:
-            reasons.append(str(refusal))
-        except (ServiceError, RecordRejected) as fault:
-            reasons.append(str(fault))
-            lasting = False
-        else:
-            return Outcome(station, (), lasting=True)
-    return Outcome(station, tuple(dict.fromkeys(reasons)), lasting)
-
-
-class _NoData(ServiceError):
-    """A service answered that it has no data (204)."""
-
-
 class Records(NamedTuple):
     """
     Records of an answer that were asked for.
@@ -154,70 +81,202 @@ class Records(NamedTuple):
         Channels of which records are left out, and why.
     """
 
-    content: bytes
-    channels: frozenset[tuple[str, str]]
+    content: bytes = b""
+    channels: frozenset[tuple[str, str]] = frozenset()
     left_out: tuple[Rejection, ...] = ()
 
 
-def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> None:
-    """Download the records of a station unless they are there."""
-    if _is_whole(path, wanted):
-        return
+class NoData(ServiceError):
+    """A service answered that it has no data (204)."""
+
+
+@dataclass(frozen=True)
+class StationFiles:
+    """
+    Files of a station in the cache: records, metadata and a status with the hashes of both.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the cache.
+    station : str
+        ``"NET.STA"``.
+    wanted : Wanted
+        The request that they answer.
+    """
+
+    folder: Path
+    station: str
+    wanted: Wanted
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """Parameters of a request for the station."""
+        network, code = self.station.split(".", 1)
+        return {"network": network, "station": code} | channel_parameters(self.wanted)
+
+    def path(self, suffix: str) -> Path:
+        """Return the path of a file."""
+        return inside(self.folder, f"{self.station}{suffix}")
+
+    def status(self) -> Status:
+        """Return the status, one without outputs if it is missing or of another request."""
+        with suppress(StatusError):
+            status = read_status(station_status(self.path(RECORDS)))
+            if status["key"] == digest(self.parameters):
+                return status
+        return {"outputs": {}}
+
+    def is_whole(self, suffix: str) -> bool:
+        """Return whether a file is as it was fetched by the same request."""
+        path = self.path(suffix)
+        known = self.status()["outputs"].get(path.name)
+        return bool(known) and hash_if_readable(path) == known
+
+    def write(
+        self, suffix: str, content: bytes, offer: Offer, left_out: Sequence[Rejection] = ()
+    ) -> None:
+        """Write a file, and then its hash into the status; the same content leaves no trace."""
+        path, new = self.path(suffix), bytes_hash(content)
+        before = self.status()
+        if before["outputs"].get(path.name) == new == hash_if_readable(path):
+            return
+        outputs = {name: known for name, known in before["outputs"].items() if name != path.name}
+        with written_whole(path) as part:
+            part.write_bytes(content)
+        outputs[path.name] = new
+        # The word shard makes the status a description, which a folder of records passes over
+        facts = {
+            "shard": outputs.get(f"{self.station}{RECORDS}"),
+            "channels": offer.channels,
+            # Metadata come after the records
+            "left_out": [*left_out] if suffix == RECORDS else before.get("left_out", []),
+        }
+        write_status(station_status(path), digest(self.parameters), outputs, facts)
+
+
+def station_status(path: Path) -> Path:
+    """Return the status file of a station, with hashes and channels, by one of its files."""
+    return path.with_suffix(".json")
+
+
+def ends_early(file: Path, end: UTCDateTime) -> bool:
+    """Return whether the shortest channel of a file ends before a window; of no file, it does."""
+    ends: dict[str, UTCDateTime] = {}
+    try:
+        for trace in obspy.read(file, format="MSEED", headonly=True):
+            ends[trace.id] = max(ends.get(trace.id, UTCDateTime(0)), trace.stats.endtime)
+    except (OSError, ValueError, TypeError):
+        return True
+    return bool(min(ends.values(), default=UTCDateTime(0)) < end - CUT)
+
+
+def fetch_station(
+    pool: WebPool,
+    wanted: Wanted,
+    folder: Path,
+    station: str,
+    offers: list[Offer],
+    live: Sequence[ServerAddress] = (),
+    cut: bool = False,
+) -> Outcome:
+    """
+    Download a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``.
+
+    A file that is as it was fetched is not requested again; ``NET.STA.json`` has the hashes of both
+    and the channels that were asked for.
+
+    Parameters
+    ----------
+    pool : WebPool
+        Connections and patience.
+    wanted : Wanted
+        Window and codes.
+    folder : Path
+        Of the cache.
+    station : str
+        ``"NET.STA"``.
+    offers : list of Offer
+        In order of preference.
+    live : sequence of ServerAddress
+        SeedLink servers, which are asked for records that no service has.
+    cut : bool
+        Whether records that end before the window are requested again; they stay where that fails.
+    """
+    files, reasons, lasting = StationFiles(folder, station, wanted), list[str](), True
+    # Minutes after an earthquake archives may lack data that servers of real-time data have
+    sources: list[tuple[Offer, ServerAddress | None]] = [(offer, None) for offer in offers]
+    sources += [(offer, server) for server, offer in product(live, offers)]
+    is_cut = cut and ends_early(files.path(RECORDS), wanted.end)
+    # The next source is tried only where one fails
+    for offer, server in sources:
+        try:
+            if is_cut or not files.is_whole(RECORDS):
+                records = _records(pool, files, offer, server)
+                files.write(RECORDS, records.content, offer, records.left_out)
+                is_cut = False
+            if not files.is_whole(METADATA):
+                files.write(METADATA, _metadata(pool, files, offer), offer)
+        except (ServiceError, RecordRejected) as fault:
+            reasons.append(str(fault))
+            lasting = lasting and isinstance(fault, NoData)
+        else:
+            return Outcome(station, (), lasting=True)
+    return Outcome(station, tuple(dict.fromkeys(reasons)), lasting)
+
+
+def _records(
+    pool: WebPool, files: StationFiles, offer: Offer, server: ServerAddress | None
+) -> Records:
+    """Return the records of a station, from a SeedLink server or the service of an offer."""
+    if server is not None:
+        window = (files.wanted.start, files.wanted.end)
+        content = seedlink_window(pool, server, files.station, offer.channels, window)
+        # Real-time servers confuse channels and times as archives do
+        return _all_asked(content, f"seedlink://{server}", files, str(server))
     url = f"{offer.base}/fdsnws/dataselect/1/query"
-    parameters = _parameters(wanted, path.stem)
-    content = _records(pool, url, parameters, offer)
-    if not content:
-        raise _NoData(f"{host(url)} has no data of the window")
-    records = asked_records(content, url, wanted, path.stem)
-    if not records.content:
-        raise _other(records, url, wanted)
+    records, faults = Records(), list[ServiceError]()
+    with suppress(RequestTooLarge):
+        content = steady_answer(pool, url, files.parameters)
+        records = _all_asked(content, url, files, host(url))
     # A cut at a MiniSEED record loses whole channels: those that are missing are asked for alone
     for codes in offer.channels:
         if codes not in records.channels:
-            records = _with_channel(pool, url, wanted, path.stem, records, codes)
-    _write(path, records.content, wanted, offer, records.left_out)
+            try:
+                records = _with_channel(pool, url, files, records, codes)
+            except EmptyAnswer as error:
+                faults.append(error)
+    if not records.content:
+        raise faults[-1] if faults else NoData(f"{host(url)} has no data of the window")
+    return records
+
+
+def _all_asked(content: bytes, url: str, files: StationFiles, source: str) -> Records:
+    """Return the records of an answer; raise an error if nothing in it was asked for."""
+    if not content:
+        raise NoData(f"{source} has no data of the window")
+    records = asked_records(content, url, files.wanted, files.station)
+    if not records.content:
+        raise _other(records, url, files.wanted)
+    return records
 
 
 def _with_channel(
-    pool: WebPool,
-    url: str,
-    wanted: Wanted,
-    station: str,
-    records: Records,
-    codes: tuple[str, str],
+    pool: WebPool, url: str, files: StationFiles, records: Records, codes: tuple[str, str]
 ) -> Records:
     """Return the records of a station with those of one more channel, if its service has any."""
-    alone = b""
-    # The other channels are there, so that the service has none of this one
-    with suppress(EmptyAnswer):
-        alone = _framed(pool, url, _parameters(wanted, station) | _selected(codes))
+    location, channel = codes[0] or "--", codes[1]
+    selected = {"location": location, "channel": channel}
+    alone = steady_answer(pool, url, files.parameters | selected)
     if not alone:
         return records
-    only = wanted._replace(locations=(codes[0] or "--",), channels=(codes[1],))
-    more = asked_records(alone, url, only, station)
+    only = files.wanted._replace(locations=(location,), channels=(channel,))
+    more = asked_records(alone, url, only, files.station)
     # Records of another time are those of a gap: the channel has none of the window
     if not more.content and codes not in {tuple(row.name.split(".")[2:]) for row in more.left_out}:
         raise _other(more, url, only)
     left_out = dict.fromkeys((*records.left_out, *more.left_out))
     return Records(records.content + more.content, records.channels | more.channels, (*left_out,))
-
-
-def _fetch_live(
-    pool: WebPool, wanted: Wanted, path: Path, offer: Offer, server: ServerAddress
-) -> None:
-    """Download the records of a station from a SeedLink server unless they are there."""
-    if _is_whole(path, wanted):
-        return
-    window = (wanted.start, wanted.end)
-    content = seedlink_window(pool, server, path.stem, offer.channels, window)
-    if not content:
-        raise _NoData(f"{server} has no data of the window")
-    # Real-time servers confuse channels and times as archives do
-    url = f"seedlink://{server}"
-    records = asked_records(content, url, wanted, path.stem)
-    if not records.content:
-        raise _other(records, url, wanted)
-    _write(path, records.content, wanted, offer, records.left_out)
 
 
 def asked_records(content: bytes, url: str, wanted: Wanted, station: str) -> Records:
@@ -249,7 +308,7 @@ def asked_records(content: bytes, url: str, wanted: Wanted, station: str) -> Rec
     if surplus := len(content) % record_length:
         problem = f"the answer is cut: its last MiniSEED record has {surplus} bytes"
         raise RecordRejected(shown, problem)
-    _check(shown, station, {station_name(trace) for trace in traces})
+    _require_station(shown, station, {station_name(trace) for trace in traces})
     return _divided(content, traces, shown, wanted)
 
 
@@ -257,16 +316,15 @@ def _divided(content: bytes, traces: Stream, url: str, wanted: Wanted) -> Record
     """Return the records that were asked for, and one row per channel with others."""
     others, channels = dict[str, Rejection](), set[tuple[str, str]]()
     for trace in traces:
-        stats = trace.stats
-        codes = (stats.location, stats.channel)
+        stats, codes = trace.stats, (trace.stats.location, trace.stats.channel)
+        # One row per channel, and no record of another time or channel
         if problem := other_than_asked(wanted, codes, stats.starttime, stats.endtime):
             reason = f"records {problem}, are left out of the answer: asked for {asked_for(wanted)}"
             others.setdefault(trace.id, Rejection("record", trace.id, url, None, (reason,)))
         else:
             channels.add(codes)
     # Samples are not coded again
-    if others:
-        content = _without_others(content, wanted)
+    content = _without_others(content, wanted) if others else content
     return Records(content, frozenset(channels), tuple(others.values()))
 
 
@@ -286,74 +344,36 @@ def _without_others(content: bytes, wanted: Wanted) -> bytes:
 
 def _other(records: Records, url: str, wanted: Wanted) -> RecordRejected:
     """Return the error of an answer that holds nothing that was asked for."""
-    found = "; ".join(
-        f"{row.name} {row.reasons[0].partition(', are')[0]}" for row in records.left_out
+    others = (f"{row.name} {row.reasons[0].partition(', are')[0]}" for row in records.left_out)
+    problem = f"answers with {'; '.join(others)}: asked for {asked_for(wanted)}"
+    return RecordRejected(public_url(url), problem)
+
+
+def _metadata(pool: WebPool, files: StationFiles, offer: Offer) -> bytes:
+    """Return the StationXML of a station; refuse that of another one, place, time or channel."""
+    url = f"{offer.base}/fdsnws/station/1/query"
+    content = answer(pool, url, files.parameters | {"level": "response"})
+    if not content:
+        raise NoData(f"{host(url)} has no metadata of the window")
+    shown = public_url(url)
+    inventory: Inventory = read_bytes_with_obspy(
+        obspy.read_inventory, content, shown, format="STATIONXML"
     )
-    return RecordRejected(public_url(url), f"answers with {found}: asked for {asked_for(wanted)}")
-
-
-def _records(pool: WebPool, url: str, parameters: dict[str, str], offer: Offer) -> bytes:
-    """Return the records of a station, channel by channel if all at once are too many."""
-    try:
-        return _framed(pool, url, parameters)
-    except RequestTooLarge:
-        pass
-    content, empty = b"", None
-    for codes in offer.channels:
-        try:
-            content += _framed(pool, url, parameters | _selected(codes))
-        except EmptyAnswer as error:
-            empty = error
-    if empty and not content:
-        raise empty
+    # An answer for another station must not enter the cache under this name
+    stations = {f"{network.code}.{station.code}" for network in inventory for station in network}
+    _require_station(shown, files.station, stations)
+    _require_metadata(shown, inventory, files.wanted)
     return content
 
 
-def _selected(codes: tuple[str, str]) -> dict[str, str]:
-    """Return the parameters that select one channel."""
-    return {"location": codes[0] or "--", "channel": codes[1]}
-
-
-def _framed(pool: WebPool, url: str, parameters: dict[str, str]) -> bytes:
-    """Return an answer whose end the service announced, or that is the same a second time."""
-    first = whole_answer(pool, url, parameters)
-    # Where no length is announced, a connection that breaks looks like the end
-    for _ in range(_COMPARISONS):
-        if first.is_framed:
-            return first.content
-        second = whole_answer(pool, url, parameters)
-        if second.content == first.content:
-            return first.content
-        first = second
-    raise ServiceError(f"{public_url(url)}: its answers are cut at different places")
-
-
-def _fetch_metadata(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> None:
-    """Download the metadata of a station unless they are there."""
-    if _is_whole(path, wanted):
-        return
-    url = f"{offer.base}/fdsnws/station/1/query"
-    content = answer(pool, url, _parameters(wanted, path.stem) | {"level": "response"})
-    if not content:
-        raise _NoData(f"{host(url)} has no metadata of the window")
-    shown = public_url(url)
-    inventory = read_bytes_with_obspy(obspy.read_inventory, content, shown, format="STATIONXML")
-    # An answer for another station must not enter the cache under this name
-    found = {f"{network.code}.{station.code}" for network in inventory for station in network}
-    _check(shown, path.stem, found)
-    _check_metadata(shown, inventory, wanted)
-    _write(path, content, wanted, offer)
-
-
-def _check_metadata(url: str, inventory: Inventory, wanted: Wanted) -> None:
+def _require_metadata(url: str, inventory: Inventory, wanted: Wanted) -> None:
     """Refuse metadata of another place, or without a channel of the request in its window."""
+    stations = [station for network in inventory for station in network]
     if not stations_inside(inventory, wanted):
-        (station, *_) = (station for network in inventory for station in network)
-        place = f"{station.latitude:g}, {station.longitude:g}"
+        place = f"{stations[0].latitude:g}, {stations[0].longitude:g}"
         problem = f"answers with a station at {place}, outside the circle of the request"
         raise RecordRejected(url, problem)
     # Channels that were not asked for may be there as well
-    channels = [channel for network in inventory for station in network for channel in station]
     problems = [
         other_than_asked(
             wanted,
@@ -361,73 +381,17 @@ def _check_metadata(url: str, inventory: Inventory, wanted: Wanted) -> None:
             channel.start_date,
             channel.end_date,
         )
-        for channel in channels
+        for station in stations
+        for channel in station
     ]
     if all(problems):
-        found = problems[0] if problems else "without a channel"
-        problem = f"answers with metadata {found}: asked for {asked_for(wanted)}"
+        others = problems[0] if problems else "without a channel"
+        problem = f"answers with metadata {others}: asked for {asked_for(wanted)}"
         raise RecordRejected(url, problem)
 
 
-def _parameters(wanted: Wanted, station: str) -> dict[str, str]:
-    """Return the parameters of a request for one station."""
-    network, code = station.split(".", 1)
-    return {"network": network, "station": code} | channel_parameters(wanted)
-
-
-def _check(url: str, station: str, found: set[str]) -> None:
+def _require_station(url: str, station: str, stations: set[str]) -> None:
     """Refuse an answer that does not hold exactly the station of the request."""
-    if found != {station}:
-        raise RecordRejected(
-            url, f"answers with {', '.join(sorted(found)) or 'no data'} instead of {station}"
-        )
-
-
-def _write(
-    path: Path,
-    content: bytes,
-    wanted: Wanted,
-    offer: Offer,
-    left_out: Sequence[Rejection] = (),
-) -> None:
-    """Write a file of a station, and then its hash into the status of the station."""
-    before = _status(path, wanted)
-    outputs = {name: known for name, known in before["outputs"].items() if name != path.name}
-    with written_whole(path) as part:
-        part.write_bytes(content)
-    outputs[path.name] = bytes_hash(content)
-    # Metadata come after the records
-    rows = [*left_out] if path.suffix == ".mseed" else before.get("left_out", [])
-    # The word shard makes the status a description, which a folder of records passes over
-    facts = {
-        "shard": outputs.get(f"{path.stem}.mseed"),
-        "channels": offer.channels,
-        "left_out": rows,
-    }
-    write_status(station_status(path), _key(path, wanted), outputs, facts)
-
-
-def station_status(path: Path) -> Path:
-    """Return the status file of a station, with hashes and channels, by one of its files."""
-    return path.with_suffix(".json")
-
-
-def _is_whole(path: Path, wanted: Wanted) -> bool:
-    """Return whether a file is as it was fetched by the same request."""
-    known = _status(path, wanted)["outputs"].get(path.name)
-    return bool(known) and hash_if_readable(path) == known
-
-
-def _status(path: Path, wanted: Wanted) -> Status:
-    """Return the status of a station, one without outputs if it is missing or of other work."""
-    empty: Status = {"outputs": {}}
-    try:
-        status = read_status(station_status(path))
-    except StatusError:
-        return empty
-    return status if status["key"] == _key(path, wanted) else empty
-
-
-def _key(path: Path, wanted: Wanted) -> str:
-    """Return the hash of the request for a station."""
-    return digest(_parameters(wanted, path.stem))
+    if stations != {station}:
+        others = ", ".join(sorted(stations)) or "no data"
+        raise RecordRejected(url, f"answers with {others} instead of {station}")

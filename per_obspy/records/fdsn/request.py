@@ -11,6 +11,7 @@ from obspy.geodetics import kilometers2degrees, locations2degrees
 
 from per_obspy import config
 from per_obspy.errors import CatalogError
+from per_obspy.records.earthquakes.earthquake import origin_of
 
 #: Time of an answer before and after the window that is no fault, s: services cut at whole MiniSEED
 #: records (reasoned: those of strong motion are shorter).
@@ -88,9 +89,9 @@ def window(request: config.Window, event: Event | None) -> tuple[UTCDateTime, UT
 
 
 def _origin(event: Event | None) -> Origin:
-    """Return the preferred origin of an event, or its first."""
+    """Return the origin of an event."""
     assert event is not None  # config.Records demands an event where place or time is not given
-    return event.preferred_origin() or event.origins[0]
+    return origin_of(event)
 
 
 def station_parameters(wanted: Wanted) -> dict[str, str]:

@@ -5,40 +5,42 @@ A request is repeated when its fault may pass, else refused in one line.
 """
 
 import math
-import re
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from datetime import UTC, datetime
-from email.utils import parsedate_to_datetime
-from types import MappingProxyType
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 from urllib.parse import unquote, urljoin, urlsplit, urlunsplit
 
 import urllib3
+from urllib3.exceptions import HTTPError, InvalidHeader, LocationValueError
 
 from per_obspy.errors import ServiceError
 from per_obspy.names import public_url
 
-#: faults that may pass: too many requests, and all faults on the side of the service
+#: Faults that may pass: too many requests, and all faults on the side of the service.
 PASSING_FAULTS = (429, 500, 502, 503, 504)
 
-#: longest pause before the next attempt, s, even if a service demands a longer one
+#: Longest pause before the next attempt, s, even if a service demands a longer one.
 LONGEST_WAIT = 600
 
 #: Default limits of one answer: s, and bytes after unpacking.
 LONGEST_ANSWER, LARGEST_ANSWER = 600.0, 256 * 2**20
 
-_NO_CONTENT, _NOT_FOUND, _TOO_LARGE, _URI_TOO_LONG = 204, 404, 413, 414
+_NO_CONTENT, _NOT_FOUND = 204, 404
 
-#: Answers of event services to the identifier of a deleted earthquake.
-_DELETED = (409, 410)
+#: Answers to a request that must be divided, and of event services to a deleted earthquake.
+_TOO_LARGE, _DELETED = (413, 414), (409, 410)
 
-_REDIRECTIONS, _MOST_REDIRECTIONS = (301, 302, 303, 307, 308), 5
+_MOST_REDIRECTIONS = 5
 
 #: Bytes that are read at once, and of a page that explains an error.
 _PIECE, _PAGE = 2**16, 2**12
+
+#: Times that an answer without an announced end is compared with the next.
+_COMPARISONS = 3
 
 
 class NotFound(ServiceError):
@@ -61,20 +63,24 @@ class PassingFault(ServiceError):
         self.pause = pause
 
 
-class WebPool(NamedTuple):
+@dataclass(frozen=True)
+class WebPool:
     """
-    Connections to services, and patience with them; see :func:`web_pool`.
+    Connections to services, and patience with them.
 
-    Attributes
+    Parameters
     ----------
-    connections : urllib3.PoolManager
+    timeout : float
+        Longest wait for an answer, or for more of it, s.
     retries : int
+        Number of further attempts after time-outs, cut answers, 429 and 5xx. A ``Retry-After`` of
+        the service counts. Redirections are followed apart from them.
     wait : float
-        s.
+        Unit of the pauses, s: wait * 2^(n-1) after the n-th failed attempt, none after the first.
     longest : float
-        s.
+        Longest time of one attempt in all, s.
     largest : int
-        Bytes.
+        Largest answer, bytes after unpacking.
     longest_pause : float
         s; a service that demands a longer pause is given up at once.
     resting : mapping
@@ -83,14 +89,20 @@ class WebPool(NamedTuple):
         Collects the hosts that are given up and the pause that each demands, s.
     """
 
-    connections: urllib3.PoolManager
+    timeout: float
     retries: int
     wait: float
-    longest: float
-    largest: int
+    longest: float = LONGEST_ANSWER
+    largest: int = LARGEST_ANSWER
     longest_pause: float = math.inf
-    resting: Mapping[str, float] = MappingProxyType({})
+    resting: Mapping[str, float] = field(default_factory=dict)
     demanded: dict[str, float] | None = None
+
+    @cached_property
+    def connections(self) -> urllib3.PoolManager:
+        """Connections, which are kept for further requests."""
+        agent = {"User-Agent": "per_obspy"}
+        return urllib3.PoolManager(retries=False, timeout=self.timeout, maxsize=16, headers=agent)
 
 
 class Answer(NamedTuple):
@@ -109,42 +121,7 @@ class Answer(NamedTuple):
     is_framed: bool
 
 
-def web_pool(
-    timeout: float,
-    retries: int,
-    wait: float,
-    longest: float = LONGEST_ANSWER,
-    largest: int = LARGEST_ANSWER,
-) -> WebPool:
-    """
-    Return a pool of connections.
-
-    Parameters
-    ----------
-    timeout : float
-        Longest wait for an answer, or for more of it, s.
-    retries : int
-        Number of further attempts after time-outs, cut answers, 429 and 5xx. A ``Retry-After`` of
-        the service counts. Redirections are followed apart from them.
-    wait : float
-        Unit of the pauses, s: wait * 2^(n-1) after the n-th failed attempt, none after the first.
-    longest : float
-        Longest time of one attempt in all, s.
-    largest : int
-        Largest answer, bytes after unpacking.
-    """
-    connections = urllib3.PoolManager(
-        retries=False, timeout=timeout, maxsize=16, headers={"User-Agent": "per_obspy"}
-    )
-    return WebPool(connections, retries, wait, longest, largest)
-
-
 def answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> bytes:
-    """Return the content of :func:`whole_answer`."""
-    return whole_answer(pool, url, parameters).content
-
-
-def whole_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
     """
     Return the whole answer of a service; empty if it has no data (204).
 
@@ -159,67 +136,79 @@ def whole_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answ
     ServiceError
         If there is no answer, it takes too long or is too large, or it is another fault.
     """
+    return _patient_answer(pool, url, parameters).content
+
+
+def steady_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> bytes:
+    """Return an answer whose end the service announced, or that is the same a second time."""
+    first = _patient_answer(pool, url, parameters)
+    # Where no length is announced, a connection that breaks looks like the end
+    for _ in range(_COMPARISONS):
+        if first.is_framed:
+            return first.content
+        second = _patient_answer(pool, url, parameters)
+        if second.content == first.content:
+            return first.content
+        first = second
+    raise ServiceError(f"{public_url(url)}: its answers are cut at different places")
+
+
+def _patient_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
+    """Return the answer of the first attempt without a fault that may pass."""
     if rest := pool.resting.get(host(url)):
         reason = f"is not asked for another {rest:.0f} s, as it demanded by Retry-After"
         raise PassingFault(f"{public_url(url)}: {reason}", rest)
-    for attempt in range(1, pool.retries + 2):
+    retry = urllib3.Retry(pool.retries, backoff_factor=pool.wait, backoff_max=LONGEST_WAIT)
+    while True:
         try:
-            return _within(pool, url, lambda: _attempt(pool, url, parameters))
+            return _timely_answer(pool, url, parameters)
         except PassingFault as fault:
-            if attempt > pool.retries or (fault.pause or 0.0) > pool.longest_pause:
-                _note_demand(pool, url, fault)
+            # After the last attempt, or where the service wants to be left alone for long
+            demanded = fault.pause or 0.0
+            if not retry.total or demanded > pool.longest_pause:
+                # The longest pause that the host demands
+                if pool.demanded is not None and demanded:
+                    known = pool.demanded.get(host(url), 0.0)
+                    pool.demanded[host(url)] = max(known, demanded)
                 raise
-            time.sleep(_pause(pool.wait, attempt, fault.pause))
-    raise AssertionError  # the last attempt returns or raises
+            retry = retry.increment("GET", url, error=fault)
+            pause = retry.get_backoff_time() if fault.pause is None else fault.pause
+            time.sleep(min(pause, LONGEST_WAIT))
 
 
-def _note_demand(pool: WebPool, url: str, fault: PassingFault) -> None:
-    """Collect the pause that a service demands, the longest of each host."""
-    if pool.demanded is not None and fault.pause:
-        name = host(url)
-        pool.demanded[name] = max(pool.demanded.get(name, 0.0), fault.pause)
+def _timely_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
+    """Return the answer of one attempt, or raise its error or one that it takes too long."""
+    outcome = list[Answer | OSError | MemoryError]()
 
-
-def _pause(wait: float, attempt: int, demanded: float | None) -> float:
-    """Return the time before the next attempt, s."""
-    usual = wait * 2.0 ** min(attempt - 1, 60) if attempt > 1 else 0.0
-    return min(max(usual if demanded is None else demanded, 0.0), LONGEST_WAIT)
-
-
-def _within(pool: WebPool, url: str, work: Callable[[], Answer]) -> Answer:
-    """Return the result of some work, or raise its error or one that it takes too long."""
-    results, errors = list[Answer](), list[Exception]()
-
-    def do() -> None:
+    def attempt() -> None:
+        # All errors of services are errors of the operating system too
         try:
-            results.append(work())
-        except Exception as error:  # noqa: BLE001 - raised again below
-            errors.append(error)
+            outcome.append(_attempt(pool, url, parameters))
+        except (OSError, MemoryError) as error:
+            outcome.append(error)
 
     # A service can keep a connection busy at every step; the thread of such a one is left behind
-    thread = threading.Thread(target=do, daemon=True)
+    thread = threading.Thread(target=attempt, daemon=True)
     thread.start()
     thread.join(pool.longest)
-    for error in errors:
-        raise error
-    if not results:
+    if thread.is_alive():
         raise ServiceError(f"{public_url(url)}: no whole answer within {pool.longest:g} s")
-    return results[0]
+    (result,) = outcome
+    if isinstance(result, BaseException):
+        raise result
+    return result
 
 
 def _attempt(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
     """Return the answer of one attempt; redirections are followed."""
     shown, until = public_url(url), time.monotonic() + pool.longest
     try:
-        response = _redirected(pool, url, parameters)
-        try:
+        # The rest of an answer is not read
+        with _redirected(pool, url, parameters) as response:
             return _read(pool, response, shown, until)
-        finally:
-            # The rest of an answer is not read
-            response.close()
-    except urllib3.exceptions.LocationValueError as error:
+    except LocationValueError as error:
         raise ServiceError(f"{shown}: is no address") from error
-    except (urllib3.exceptions.HTTPError, ValueError) as error:
+    except (HTTPError, ValueError) as error:
         cause = getattr(error, "reason", None) or error
         raise PassingFault(f"{shown}: no answer: {_one_line(str(cause))}") from error
 
@@ -239,8 +228,8 @@ def _redirected(pool: WebPool, url: str, parameters: Mapping[str, str]) -> urlli
             preload_content=False,
             redirect=False,
         )
-        place = response.headers.get("Location")
-        if response.status not in _REDIRECTIONS or not place:
+        place = response.get_redirect_location()
+        if not place:
             return response
         response.close()
         # The new place has the parameters of the request in it, if it wants them
@@ -280,42 +269,39 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
     if not content or content.isspace():
         reason = 'an empty answer (HTTP 200), which is not "no data" (HTTP 204)'
         raise EmptyAnswer(f"{shown}: {reason}: asked again later")
-    names = {name.lower() for name in response.headers}
-    is_framed = bool(names & {"content-length", "transfer-encoding"})
+    is_framed = "Content-Length" in response.headers or "Transfer-Encoding" in response.headers
     return Answer(bytes(content), is_framed)
 
 
 def _refusal(response: urllib3.BaseHTTPResponse, shown: str) -> ServiceError:
     """Return the error of a response whose status is one."""
-    if response.status in (_NOT_FOUND, *_DELETED):
-        kind = "not found" if response.status == _NOT_FOUND else "deleted"
-        return NotFound(f"{shown}: {kind} (HTTP {response.status})")
-    if response.status in (_TOO_LARGE, _URI_TOO_LONG):
-        problem = f"refuses to answer so much at once (HTTP {response.status})"
-        return RequestTooLarge(f"{shown}: {problem}")
+    status = f"(HTTP {response.status})"
+    if response.status == _NOT_FOUND:
+        return NotFound(f"{shown}: not found {status}")
+    if response.status in _DELETED:
+        return NotFound(f"{shown}: deleted {status}")
+    if response.status in _TOO_LARGE:
+        return RequestTooLarge(f"{shown}: refuses to answer so much at once {status}")
     # The page of the service may name the reason
     page = _one_line(response.read1(_PAGE).decode("utf-8", "replace"))
     message = f"{shown}: HTTP {response.status}: {page}"
     if response.status in PASSING_FAULTS:
-        return PassingFault(message, _demanded_pause(response.headers.get("Retry-After")))
+        return PassingFault(message, _demanded_pause(response.headers.get("Retry-After", "")))
     return ServiceError(message)
 
 
-def _demanded_pause(header: str | None) -> float | None:
+def _demanded_pause(header: str) -> float | None:
     """
     Return the pause of a ``Retry-After``, s or a date; None if it is neither.
 
-    >>> _demanded_pause("7"), _demanded_pause("soon"), _demanded_pause(None)
-    (7.0, None, None)
+    >>> _demanded_pause("7"), _demanded_pause("soon"), _demanded_pause("9" * 10)
+    (7, None, None)
     """
-    if header is None:
+    # Thirty years are no pause
+    if len(header) > 9 and header.strip().isdigit():
         return None
-    if re.fullmatch(r"\s*[0-9]{1,9}\s*", header):
-        return float(header)
-    with suppress(ValueError, TypeError, OverflowError):
-        moment = parsedate_to_datetime(header[:100])
-        moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-        return (moment - datetime.now(UTC)).total_seconds()
+    with suppress(InvalidHeader, ValueError, TypeError, OverflowError):
+        return urllib3.Retry().parse_retry_after(header[:100])
     return None
 
 

@@ -7,6 +7,7 @@ import pytest
 from obspy import Trace, UTCDateTime
 
 from per_obspy.errors import CatalogError
+from per_obspy.records.earthquakes.earthquake import Earthquake
 from per_obspy.records.earthquakes.groups import (
     EventGroup,
     RecordSpan,
@@ -17,7 +18,6 @@ from per_obspy.records.earthquakes.groups import (
     record_span,
     station_files,
 )
-from per_obspy.records.earthquakes.header_event import HeaderEvent
 
 MAIN = UTCDateTime(2019, 7, 6, 3, 19, 53)
 FORE = UTCDateTime(2019, 7, 4, 17, 33, 49)
@@ -77,10 +77,10 @@ def test_groups_of_other_stations_within_a_day_may_differ_by_their_clocks_only()
 
 @pytest.mark.parametrize(
     ("event", "expected"),
-    [(HeaderEvent(magnitude=8.5), 1), (HeaderEvent(magnitude=5.0), 0), (None, 1)],
+    [(Earthquake(magnitude=8.5), 1), (Earthquake(magnitude=5.0), 0), (None, 1)],
 )
 def test_another_magnitude_in_a_header_is_another_earthquake(event, expected):
-    main = span("N.A", MAIN)._replace(event=HeaderEvent(str(MAIN), magnitude=8.8))
+    main = span("N.A", MAIN)._replace(event=Earthquake(time=str(MAIN), magnitude=8.8))
     groups = event_groups([main, span("N.B", MAIN + 4000)._replace(event=event)])
     assert len(differ_by_clocks(groups, groups[0])) == expected
 

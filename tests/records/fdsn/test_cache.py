@@ -22,7 +22,6 @@ from fdsn_server import (
     moved,
     mseed,
     serving,
-    shortened,
     stalled,
     status,
 )
@@ -229,12 +228,9 @@ def test_waits_double(server: FdsnServer, ask: Ask):
 LASTING = {
     "500": (status(500), "HTTP 500: the service is unwell"),
     "403": (status(403), "HTTP 403"),
-    "404": (status(404), "not found"),
     "413": (status(413), "refuses to answer so much at once (HTTP 413)"),
     "cut body": (cut, "IncompleteRead"),
     "stalled body": (stalled(1.5), "Read timed out"),
-    "web page": (content(b"<html>log in first</html>"), "ObsPy cannot read it"),
-    "cut by the service": (shortened, "cut"),
 }
 
 

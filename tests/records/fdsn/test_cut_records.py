@@ -5,10 +5,8 @@ from fdsn_server import serving, status
 from obspy import UTCDateTime, read
 
 from per_obspy.config import Fdsn, Scenario
-from per_obspy.errors import ServiceError
 from per_obspy.files import file_hash
-from per_obspy.records.fdsn.cache import fetch, fetched_stations
-from per_obspy.records.fdsn.cut_records import cut_records_aside
+from per_obspy.records.fdsn.cache import fetch, fetched_stations, has_cut_records
 from per_obspy.simulation.earthquake import simulate
 
 ORIGIN = UTCDateTime(2000, 1, 1)
@@ -40,9 +38,9 @@ def hashes(folder):
 def test_a_record_that_has_grown_is_fetched_whole(server, request_):
     server.records_until = ORIGIN + 15
     fetched = fetch(request_)
+    assert has_cut_records(fetched)
     server.records_until = None
-    with cut_records_aside(request_):
-        fetch(request_, again=True)
+    fetch(request_, again=True, cut=True)
     ((file,),) = fetched_stations(fetched).stations.values()
     assert min(trace.stats.endtime for trace in read(file)) > ORIGIN + 20
 
@@ -52,10 +50,9 @@ def test_a_record_stays_where_its_service_fails(server, request_):
     fetch(request_)
     before = hashes(request_.cache)
     server.fail("dataselect", "S001", status(503))
-    with pytest.raises(ServiceError), cut_records_aside(request_):
-        fetch(request_, again=True)
+    fetched = fetch(request_, again=True, cut=True)
+    assert "HTTP 503" in fetched.rejected[0].reasons[0]
     assert hashes(request_.cache) == before
-    fetched = fetch(request_)
     assert list(fetched_stations(fetched).stations) == ["XX.S001"]
 
 
@@ -64,21 +61,8 @@ def test_the_same_record_leaves_no_trace(server, request_):
     fetch(request_)
     before = hashes(request_.cache)
     asked = server.asked("dataselect")
-    with cut_records_aside(request_):
-        fetch(request_, again=True)
+    fetch(request_, again=True, cut=True)
     assert server.asked("dataselect") == asked + 1
-    assert hashes(request_.cache) == before
-
-
-def test_what_a_killed_program_set_aside_returns(server, request_):
-    server.records_until = ORIGIN + 15
-    fetch(request_)
-    before = hashes(request_.cache)
-    killed = cut_records_aside(request_)
-    killed.__enter__()
-    assert hashes(request_.cache) != before
-    with cut_records_aside(request_):
-        pass
     assert hashes(request_.cache) == before
 
 
@@ -86,6 +70,5 @@ def test_whole_records_are_not_asked_for_again(server, request_):
     whole = request_.model_copy(update={"end": str(ORIGIN + 15)})
     fetch(whole)
     asked = server.asked("dataselect")
-    with cut_records_aside(whole):
-        fetch(whole, again=True)
+    fetch(whole, again=True, cut=True)
     assert server.asked("dataselect") == asked

@@ -17,15 +17,15 @@ from fdsn_server import (
     status,
     unframed,
 )
-from obspy import Stream, UTCDateTime, read, read_inventory
+from obspy import Stream, UTCDateTime, read
 from obspy.core.inventory import Station
 from seedlink_server import seedlink
 
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.records.fdsn.download import Offer, fetch_station
 from per_obspy.records.fdsn.request import Wanted, wanted_around
-from per_obspy.records.fdsn.web import web_pool
-from per_obspy.records.seedlink.server_address import server_address
+from per_obspy.records.fdsn.web import WebPool
+from per_obspy.records.seedlink import server_address
 from per_obspy.resume import read_status
 from per_obspy.simulation.earthquake import Simulation, simulate
 
@@ -53,27 +53,8 @@ def wanted(simulation: Simulation) -> Wanted:
 
 def download(wanted: Wanted, folder: Path, *services: str):
     offers = [Offer(service, CHANNELS) for service in services]
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01)
     return fetch_station(pool, wanted, folder, "XX.S001", offers)
-
-
-def test_records_and_metadata_are_written(server: FdsnServer, wanted: Wanted, tmp_path: Path):
-    assert download(wanted, tmp_path, server.url) == ("XX.S001", (), True)
-    assert len(read(str(tmp_path / "XX.S001.mseed"))) == 3
-    assert read_inventory(str(tmp_path / "XX.S001.xml"))[0][0].code == "S001"
-
-
-def test_existing_files_are_not_requested_again(server, wanted: Wanted, tmp_path: Path):
-    for _ in range(2):
-        download(wanted, tmp_path, server.url)
-    assert (server.asked("dataselect"), server.asked("station")) == (1, 1)
-
-
-def test_a_request_that_is_too_large_is_divided_by_channel(server, wanted, tmp_path: Path):
-    server.fail("dataselect", "S001", status(413))
-    assert download(wanted, tmp_path, server.url).reasons == ()
-    assert server.asked("dataselect") == 1 + len(CHANNELS)
-    assert len(read(str(tmp_path / "XX.S001.mseed"))) == 3
 
 
 @pytest.mark.parametrize(
@@ -214,7 +195,7 @@ def test_real_time_records_of_another_time_are_refused(server, wanted, tmp_path:
         live.instead = lambda handler: handler.wfile.write(
             b"".join(b"SL%06X" % number + packet for number, packet in enumerate(packets)) + b"END"
         )
-        pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+        pool = WebPool(timeout=10.0, retries=0, wait=0.01)
         outcome = fetch_station(
             pool,
             wanted,
@@ -226,20 +207,6 @@ def test_real_time_records_of_another_time_are_refused(server, wanted, tmp_path:
     assert "of another time" in outcome.reasons[1]
     assert not outcome.lasting
     assert not list(tmp_path.iterdir())
-
-
-def test_the_next_service_is_tried(server: FdsnServer, wanted: Wanted, tmp_path: Path):
-    server.fail("dataselect", "S001", status(500))
-    assert download(wanted, tmp_path, server.url, server.url) == ("XX.S001", (), True)
-
-
-def test_another_station_is_refused(server: FdsnServer, wanted: Wanted, tmp_path: Path):
-    (tmp_path / "other").mkdir()
-    download(wanted, tmp_path / "other", server.url)
-    records = (tmp_path / "other" / "XX.S001.mseed").read_bytes()
-    server.extra["dataselect"] = records.replace(b"S001", b"S002")
-    outcome = download(wanted, tmp_path, server.url)
-    assert "answers with XX.S002 instead of XX.S001" in outcome.reasons[0]
 
 
 @pytest.mark.parametrize("parts", [(0.4, 1.0, 1.0), (0.4, 0.4)])

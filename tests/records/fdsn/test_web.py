@@ -10,7 +10,7 @@ from fdsn_server import FdsnServer, content, cut, endless, serving, status
 
 from per_obspy.config import Scenario
 from per_obspy.errors import ServiceError
-from per_obspy.records.fdsn.web import NotFound, RequestTooLarge, WebPool, answer, web_pool
+from per_obspy.records.fdsn.web import NotFound, RequestTooLarge, WebPool, answer
 from per_obspy.simulation.earthquake import simulate
 
 LIST = {"format": "text", "level": "station"}
@@ -24,7 +24,7 @@ def server() -> Iterator[FdsnServer]:
 
 @pytest.fixture
 def pool() -> WebPool:
-    return web_pool(timeout=10.0, retries=1, wait=0.01)
+    return WebPool(timeout=10.0, retries=1, wait=0.01)
 
 
 def stations(server: FdsnServer, pool: WebPool, **parameters: str) -> bytes:
@@ -75,7 +75,7 @@ def test_a_service_that_does_not_answer_is_named(pool: WebPool):
 def test_a_drip_ends_at_the_limit_of_time(server: FdsnServer, fault):
     server.fail("station", "*", fault)
     # a byte comes long before the time-out, the last one never
-    pool = web_pool(timeout=10.0, retries=3, wait=0.01, longest=0.5)
+    pool = WebPool(timeout=10.0, retries=3, wait=0.01, longest=0.5)
     before = server.asked("station")
     with pytest.raises(ServiceError, match=r"no whole answer within 0\.5 s"):
         stations(server, pool)
@@ -84,7 +84,7 @@ def test_a_drip_ends_at_the_limit_of_time(server: FdsnServer, fault):
 
 def test_an_endless_answer_ends_at_the_limit_of_size(server: FdsnServer):
     server.fail("station", "*", endless(b"x" * 2**16, 0.0))
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01, largest=2**20)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01, largest=2**20)
     with pytest.raises(ServiceError, match="larger than 1048576 bytes"):
         stations(server, pool)
 
@@ -93,7 +93,7 @@ def test_a_packed_bomb_ends_at_the_limit_of_size(server: FdsnServer):
     bomb = gzip.compress(bytes(2**26))
     headers = {"Content-Encoding": "gzip"}
     server.fail("station", "*", lambda handler, _: handler.reply(200, bomb, headers=headers))
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01, largest=2**20)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01, largest=2**20)
     with pytest.raises(ServiceError, match="larger than 1048576 bytes"):
         stations(server, pool)
 
@@ -121,7 +121,7 @@ def moved(place: str):
 
 
 def test_redirections_work_without_retries(server: FdsnServer):
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01)
     server.extra["/moved"] = b"words"
     server.fail("station", "*", moved("/moved"))
     assert stations(server, pool) == b"words"
@@ -147,7 +147,7 @@ def test_redirections_are_counted(server: FdsnServer, pool: WebPool):
     "fault", [status(500), status(400), cut, status(404), moved("ftp://u:secret@a/")]
 )
 def test_passwords_and_queries_are_in_no_error(server: FdsnServer, fault):
-    pool = web_pool(timeout=10.0, retries=0, wait=0.01)
+    pool = WebPool(timeout=10.0, retries=0, wait=0.01)
     server.fail("station", "*", fault)
     address = server.url.replace("://", "://user:secret@")
     with pytest.raises(ServiceError) as caught:

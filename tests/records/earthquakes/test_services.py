@@ -1,4 +1,4 @@
-"""Lists of earthquakes from files, feeds and services."""
+"""Identifiers and lists of earthquakes from files, feeds and services."""
 
 import json
 from collections.abc import Iterator
@@ -12,9 +12,17 @@ from obspy.core.event import Catalog, Event, Origin
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.records.event_file import EventRow, read_event
-from per_obspy.records.fdsn.event_list import fetched_event, find_events
-from per_obspy.records.fdsn.web import web_pool
+from per_obspy.records.earthquakes.earthquake import Earthquake
+from per_obspy.records.earthquakes.services import (
+    OTHERS,
+    RECORDS_OF,
+    event_of,
+    fetched_event,
+    find_events,
+    is_event_id,
+)
+from per_obspy.records.fdsn.providers import ROUTERS, base_url
+from per_obspy.records.fdsn.web import WebPool
 from per_obspy.simulation.earthquake import Simulation, simulate
 
 
@@ -49,7 +57,7 @@ def feed(*features: object) -> bytes:
     return json.dumps({"type": "FeatureCollection", "features": features}).encode()
 
 
-SEARLES = EventRow(
+SEARLES = Earthquake(
     "ci38457511",
     "2019-07-06T03:19:53.040",
     35.77,
@@ -112,20 +120,17 @@ def test_files_that_are_no_list_are_wrong_input(tmp_path: Path, wrong: bytes):
         find_events(str(tmp_path / "file"), {})
 
 
-def test_an_event_without_origin_is_refused(tmp_path: Path):
-    Catalog([Event()]).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    with pytest.raises(CatalogError, match="has no origin"):
+@pytest.mark.parametrize(
+    ("origins", "reason"),
+    [
+        ([], "has no origin"),
+        ([Origin(latitude=1.0, longitude=2.0)], "an origin without time"),
+    ],
+)
+def test_an_event_without_origin_or_time_is_refused(tmp_path: Path, origins, reason: str):
+    Catalog([Event(origins=origins)]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match=reason):
         find_events(str(tmp_path / "event.xml"), {})
-
-
-def test_an_origin_without_time_is_refused(tmp_path: Path):
-    Catalog([Event(origins=[Origin(latitude=1.0, longitude=2.0)])]).write(
-        str(tmp_path / "event.xml"), format="QUAKEML"
-    )
-    with pytest.raises(CatalogError, match="an origin without time"):
-        find_events(str(tmp_path / "event.xml"), {})
-    with pytest.raises(CatalogError, match="an origin without time"):
-        read_event(tmp_path / "event.xml")
 
 
 @pytest.mark.parametrize(
@@ -265,8 +270,71 @@ def test_events_have_files_of_their_own_in_the_cache(
     xml = BytesIO()
     Catalog([simulation.event]).write(xml, format="QUAKEML")
     server.fail("event", "*", *[content(xml.getvalue())] * 2)
-    cache, pool = tmp_path / "cache", web_pool(10.0, 0, 0.01)
+    cache, pool = tmp_path / "cache", WebPool(10.0, 0, 0.01)
     first = fetched_event(pool, server.url, wanted, cache)
     # an identifier that differs in a letter that no file has is another event
     second = fetched_event(pool, server.url, wanted + "+", cache)
     assert sorted(cache.glob("*.xml")) == sorted([first, second])
+
+
+#: identifiers of real earthquakes as their services name them
+FORMS = {
+    "us7000kufc": ("USGS", "us7000kufc"),
+    "ci38457511": ("USGS", "ci38457511"),
+    "nc72282711": ("USGS", "nc72282711"),
+    "usp000hvnu": ("USGS", "usp000hvnu"),
+    "official20110311054624120_30": ("USGS", "official20110311054624120_30"),
+    "2016p858000": ("GEONET", "2016p858000"),
+    "20230206_0000008": ("EMSC", "20230206_0000008"),
+    "usgs:us7000kufc": ("USGS", "us7000kufc"),
+    "geonet:2016p858000": ("GEONET", "2016p858000"),
+    "EMSC:20230206_0000008": ("EMSC", "20230206_0000008"),
+    "Ingv:7073641": ("INGV", "7073641"),
+    " us7000kufc ": ("USGS", "us7000kufc"),
+}
+
+
+@pytest.mark.parametrize("identifier", FORMS)
+def test_an_identifier_names_its_service(identifier: str):
+    assert event_of(identifier) == FORMS[identifier]
+
+
+@pytest.mark.parametrize(
+    "identifier",
+    [
+        "",
+        "7073641",
+        "records",
+        "mexico1985",
+        "US7000KUFC",
+        "run.toml",
+        "../../x",
+        "http://host/x",
+        "C:\\x",
+        "a" * 99,
+    ],
+)
+def test_an_unknown_form_is_refused_with_the_mend(identifier: str):
+    with pytest.raises(CatalogError, match=r"expected us7000abcd, geonet:2016p858000"):
+        event_of(identifier)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "reason"),
+    [("nowhere:1", "'nowhere' before the colon"), ("usgs:", "''"), ("usgs:a b", "'a b'")],
+)
+def test_a_wrong_part_is_named(identifier: str, reason: str):
+    with pytest.raises(CatalogError, match=reason):
+        event_of(identifier)
+
+
+def test_a_file_is_no_identifier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    assert is_event_id("us7000kufc")
+    Path("us7000kufc").mkdir()
+    assert not is_event_id("us7000kufc")
+
+
+def test_every_provider_of_records_is_known():
+    for provider in {*OTHERS, *sum(RECORDS_OF.values(), ())}:
+        assert provider in ROUTERS or base_url(provider).startswith("https://")

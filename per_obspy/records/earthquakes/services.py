@@ -1,39 +1,67 @@
-"""Lists of earthquakes from QuakeML files, FDSN event services and GeoJSON feeds of the USGS."""
+"""
+Earthquakes of event services: their identifiers, their lists, and the QuakeML of one of them.
+
+Lists also come from QuakeML files and from GeoJSON feeds of the USGS. The services accept their
+identifiers as parameter ``eventid``: the USGS (https://earthquake.usgs.gov/fdsnws/event/1), GeoNet
+(``publicID``, https://service.geonet.org.nz/fdsnws/event/1), EMSC
+(https://www.seismicportal.eu/fdsnws/event/1) and INGV (https://webservices.ingv.it/fdsnws/event/1).
+"""
 
 import json
 import logging
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import obspy
 from obspy import UTCDateTime
-from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, shortened
 from per_obspy.files import bytes_hash, written_whole
-from per_obspy.names import LONGEST_CODE, code_problem, inside, public_url
-from per_obspy.records.event_file import (
-    EventRow,
-    iso_time,
-    quakeml_row,
-    read_event,
-    row_problem,
-)
+from per_obspy.names import LONGEST_CODE, inside, public_url
+from per_obspy.records.earthquakes.earthquake import Earthquake
+from per_obspy.records.earthquakes.quakeml import earthquake_of, file_name, iso_time, read_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest
-from per_obspy.records.fdsn.web import NotFound, WebPool, answer, web_pool
+from per_obspy.records.fdsn.web import NotFound, WebPool, answer
 from per_obspy.records.obspy_readers import read_with_obspy
 from per_obspy.resume import earlier_status, write_status
 
+log = logging.getLogger(__name__)
+
+#: Form of an identifier -> provider that writes it so.
+_FORMS = {
+    # Code of a network and its number: us7000abcd, ci38457511, official20110311054624120_30
+    r"[a-z]{2}\d[a-z0-9]{5,12}|us[a-z]000[a-z0-9]{4}|(iscgem|official)\d[a-z0-9_]{3,30}": "USGS",
+    # Year, letter p and part of the year: 2016p858000
+    r"\d{4}p\d{6}": "GEONET",
+    # Date and number of the day: 20161113_0000040
+    r"\d{8}_\d{7}": "EMSC",
+}
+
+#: Letters that identifiers of services have.
+_IDENTIFIER = re.compile(rf"[A-Za-z0-9._:/=-]{{1,{LONGEST_CODE}}}")
+
+#: Event service -> providers of records that are asked by default.
+RECORDS_OF = {
+    "USGS": ("earthscope-federator", "eida-routing"),
+    "EMSC": ("eida-routing", "earthscope-federator"),
+    "GEONET": ("GEONET",),
+    "INGV": ("INGV", "eida-routing"),
+}
+
+#: Providers of records of all other event services.
+OTHERS = ("earthscope-federator", "eida-routing")
+
+EXPECTED = "us7000abcd, geonet:2016p858000, emsc:20161113_0000040 or ingv:8863681"
+
 #: Patience with a service that lists events: s, retries, s.
 _PATIENCE = (60.0, 3, 1.0)
-
-
-log = logging.getLogger(__name__)
 
 #: Columns of the text format of fdsnws-event 1.2.
 _TEXT_COLUMNS = 13
@@ -44,8 +72,71 @@ _CIRCLE = ("latitude", "longitude", "maxradius")
 #: Suffixes of files of events; other sources that are no file are services.
 FILES = (".xml", ".quakeml", ".json", ".geojson")
 
+#: Earthquakes of a list, and one problem per line or entry of it that cannot be read.
+Listed = tuple[list[Earthquake], list[str]]
 
-def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
+#: Faults of an entry of a list, or of a list as a whole.
+_FAULTS = (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError)
+
+
+def event_of(identifier: str) -> tuple[str, str]:
+    """
+    Return the event service of an identifier and the identifier as that service names it.
+
+    Parameters
+    ----------
+    identifier : str
+        ``PROVIDER:ID``, where the provider is a name of ObsPy in any case; or an ID alone of the
+        USGS, GeoNet or EMSC, whose forms differ. No request is made.
+
+    Raises
+    ------
+    CatalogError
+        If the provider is unknown, or an ID without a provider has no known form.
+
+    Examples
+    --------
+    >>> event_of("us7000abcd"), event_of("2016p858000"), event_of("INGV:8863681")
+    (('USGS', 'us7000abcd'), ('GEONET', '2016p858000'), ('INGV', '8863681'))
+    """
+    name = identifier.strip()
+    provider, mark, rest = name.partition(":")
+    if mark and not rest.startswith("//"):
+        try:
+            base_url(provider)
+        except CatalogError as error:
+            problem = f"{provider!r} before the colon is no event service: expected {EXPECTED}"
+            raise CatalogError(shortened(identifier), problem) from error
+        service, name = provider.upper(), rest
+    else:
+        # Forms of the services differ
+        service = next((known for form, known in _FORMS.items() if re.fullmatch(form, name)), "")
+    if not service:
+        problem = f"its form is not that of an earthquake of one service: expected {EXPECTED}"
+        raise CatalogError(shortened(identifier), problem)
+    if not _IDENTIFIER.fullmatch(name):
+        problem = f"{name[:40]!r} is no identifier of an earthquake: expected {EXPECTED}"
+        raise CatalogError(shortened(identifier), problem)
+    return service, name
+
+
+def is_event_id(text: str) -> bool:
+    """
+    Return whether a text is an identifier of an earthquake and no file or folder.
+
+    >>> is_event_id("us7000abcd"), is_event_id("records"), is_event_id("run.toml")
+    (True, False, False)
+    """
+    if Path(text).exists():
+        return False
+    try:
+        event_of(text)
+    except CatalogError:
+        return False
+    return any(letter.isdigit() for letter in text)
+
+
+def find_events(source: str, query: Mapping[str, str]) -> list[Earthquake]:
     """
     List earthquakes, the latest first.
 
@@ -66,13 +157,14 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     ServiceError
         If the service does not answer, or its answer is not an event list.
     """
-    if Path(source).is_file():
-        select = selection(source, query)
-        rows = list(filter(select, _rows_of_file(Path(source))))
+    path = Path(source)
+    if path.is_file():
+        select = _selection(source, query)
+        rows = list(filter(select, _rows_of_file(path)))
     elif source.startswith(("http://", "https://")) and ".geojson" in source:
-        select = selection(public_url(source), query)
+        select = _selection(public_url(source), query)
         rows = list(filter(select, _rows_of_answer(source, _feed_rows, {})))
-    elif Path(source).suffix.lower() in FILES and "://" not in source:
+    elif path.suffix.lower() in FILES and "://" not in source:
         raise CatalogError(source, "no such file")
     else:
         # Everything else is the base URL or the name of an event service, which selects itself
@@ -80,29 +172,26 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     return sorted(rows, key=lambda row: row.time, reverse=True)
 
 
-def _rows_of_service(source: str, query: Mapping[str, str]) -> list[EventRow]:
+def _rows_of_service(source: str, query: Mapping[str, str]) -> list[Earthquake]:
     """Return the earthquakes that an event service lists of a query."""
-    start, end = (_time(public_url(source), name, query) for name in ("starttime", "endtime"))
-    url = f"{base_url(source)}/fdsnws/event/1/query"
+    times = {name: query[name] for name in ("starttime", "endtime") if name in query}
+    select, url = _selection(public_url(source), times), _event_url(source)
     listed = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
-    rows = [row for row in listed if _is_between(row, start, end)]
+    rows = list(filter(select, listed))
     # A service may pass over a parameter that it does not know
-    if len(rows) < len(listed):
-        count = len(listed) - len(rows)
-        log.warning("%s: %d earthquakes of another time left out", public_url(url), count)
+    if others := len(listed) - len(rows):
+        log.warning("%s: %d earthquakes of another time left out", public_url(url), others)
     return rows
 
 
-def listed_events(
-    pool: WebPool, provider: str, query: Mapping[str, str]
-) -> tuple[list[EventRow], list[str]]:
+def listed_events(pool: WebPool, provider: str, query: Mapping[str, str]) -> Listed:
     """
     List earthquakes of an FDSN event service; a line that cannot be read costs no other line.
 
     Parameters
     ----------
     pool : WebPool
-        From :func:`per_obspy.records.fdsn.web.web_pool`.
+        Connections and patience.
     provider : str
         FDSN event service: base URL or ObsPy's name.
     query : mapping
@@ -110,7 +199,7 @@ def listed_events(
 
     Returns
     -------
-    rows : list of EventRow
+    rows : list of Earthquake
         In the order of the service.
     problems : list of str
         One per line that cannot be read.
@@ -123,7 +212,7 @@ def listed_events(
         If the service does not answer, or its answer is no list.
     """
     # "Not found" is the answer of some services to an empty list
-    url = f"{base_url(provider)}/fdsnws/event/1/query"
+    url = _event_url(provider)
     try:
         rows, problems = _text_rows(answer(pool, url, {**query, "format": "text"}))
     except NotFound:
@@ -134,48 +223,38 @@ def listed_events(
     return rows, [f"{public_url(url)}: {problem}" for problem in problems]
 
 
-def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], bool]:
+def _event_url(provider: str) -> str:
+    """Return the address of an event service."""
+    return f"{base_url(provider)}/fdsnws/event/1/query"
+
+
+def _selection(source: str, query: Mapping[str, str]) -> Callable[[Earthquake], bool]:
     """
     Return a function that selects the earthquakes of a query, as an FDSN event service does.
 
-    Parameters
-    ----------
-    source : str
-        File or feed, for messages.
-    query : mapping
-        As for :func:`find_events`.
-
-    Raises
-    ------
-    CatalogError
-        If a time is no time, a circle is incomplete, or a parameter needs a service.
+    Raises ``CatalogError`` about a source if a time is no time, a circle is incomplete, or a
+    parameter needs a service.
     """
     # Everything else that a service can select by is unknown of a file
-    unknown = query.keys() - {"starttime", "endtime", "minmagnitude", *_CIRCLE}
-    if unknown:
+    if unknown := query.keys() - {"starttime", "endtime", "minmagnitude", *_CIRCLE}:
         raise CatalogError(source, f"{', '.join(sorted(unknown))}: only a service can select by it")
-    # A circle needs its centre and its radius
     circle = [float(query[name]) for name in _CIRCLE if name in query]
     if circle and len(circle) < len(_CIRCLE):
         raise CatalogError(source, "latitude, longitude and radius: give all three or none")
     # Limits that are not given leave all in
-    start, end = (_time(source, name, query) for name in ("starttime", "endtime"))
-    smallest = float(query.get("minmagnitude", "-inf"))
+    start, end = _time(source, "starttime", query), _time(source, "endtime", query)
+    smallest = float(query.get("minmagnitude", -math.inf))
 
-    def select(row: EventRow) -> bool:
-        if not _is_between(row, start, end):
+    def select(row: Earthquake) -> bool:
+        # An unknown magnitude is none that is large enough
+        time, size = UTCDateTime(row.time), row.magnitude
+        if (start and time < start) or (end and time > end):
             return False
-        if "minmagnitude" in query and (row.magnitude is None or row.magnitude < smallest):
+        if (-math.inf if size is None else size) < smallest:
             return False
-        return not circle or _distance(row, *circle[:2]) <= circle[2]
+        return not circle or bool(locations2degrees(*row[2:4], *circle[:2]) <= circle[2])
 
     return select
-
-
-def _is_between(row: EventRow, start: UTCDateTime | None, end: UTCDateTime | None) -> bool:
-    """Return whether the origin time of an earthquake is in a window; None is open."""
-    time = UTCDateTime(row.time)
-    return (start is None or time >= start) and (end is None or time <= end)
 
 
 def _time(source: str, name: str, query: Mapping[str, str]) -> UTCDateTime | None:
@@ -189,11 +268,6 @@ def _time(source: str, name: str, query: Mapping[str, str]) -> UTCDateTime | Non
         raise CatalogError(source, problem) from error
 
 
-def _distance(row: EventRow, latitude: float, longitude: float) -> float:
-    """Return the distance of an epicentre from a place along a great circle, degrees."""
-    return float(locations2degrees(row.latitude, row.longitude, latitude, longitude))
-
-
 def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> Path:
     """
     Return the QuakeML file of an event in the cache; it is fetched if it is not there.
@@ -201,7 +275,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     Parameters
     ----------
     pool : WebPool
-        From :func:`per_obspy.records.fdsn.web.web_pool`.
+        Connections and patience.
     provider : str
         FDSN event service.
     event_id : str
@@ -221,10 +295,10 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
     # Anything but a whole file is fetched
-    url = f"{base_url(provider)}/fdsnws/event/1/query"
+    shown = public_url(_event_url(provider))
     content = event_content(pool, provider, event_id)
     if not content:
-        raise CatalogError(public_url(url), f"has no event {event_id}")
+        raise CatalogError(shown, f"has no event {event_id}")
     # Only an answer that can be read as one event stays in the cache
     with written_whole(path) as part:
         part.write_bytes(content)
@@ -232,7 +306,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
             read_event(part)
         except CatalogError as error:
             reason = f"answers with data other than the event: {error.problem}"
-            raise ServiceError(f"{public_url(url)}: {reason}") from error
+            raise ServiceError(f"{shown}: {reason}") from error
     write_status(status_file, digest(event_id), {path.name: bytes_hash(content)}, {})
     return path
 
@@ -248,97 +322,66 @@ def event_content(pool: WebPool, provider: str, event_id: str) -> bytes:
     ServiceError
         If the service does not answer.
     """
-    url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
-        return answer(pool, url, {"eventid": event_id, "format": "xml"})
+        return answer(pool, _event_url(provider), {"eventid": event_id, "format": "xml"})
     except NotFound:
         return b""
 
 
-def file_name(event_id: str) -> str:
-    """
-    Return a name of a file for an identifier, whatever letters that has.
-
-    Examples
-    --------
-    >>> file_name("us7000abcd"), file_name("../x")
-    ('us7000abcd', '---x-551622b6')
-    """
-    if not code_problem("", event_id):
-        return event_id
-    # Identifiers that differ in other letters only must not share a file
-    name = "".join(letter if letter.isascii() and letter.isalnum() else "-" for letter in event_id)
-    return f"{name[:LONGEST_CODE]}-{digest(event_id)}"
-
-
-#: Earthquakes of a list, and one problem per line or entry of it that cannot be read.
-Listed = tuple[list[EventRow], list[str]]
-
-
-def _rows_of_file(path: Path) -> list[EventRow]:
+def _rows_of_file(path: Path) -> list[Earthquake]:
     """Return the earthquakes of a GeoJSON or QuakeML file."""
     content = path.read_bytes()
-    try:
+
+    def read() -> Listed:
+        # Both are told apart by the first letter
         if content.lstrip()[:1] == b"{":
-            listed = _feed_rows(content)
-        else:
-            listed = _each(quakeml_row, read_with_obspy(obspy.read_events, path), _event_name)
-        return _rows_with_warnings(str(path), listed)
-    except (RecordRejected, ValueError, KeyError, TypeError) as error:
-        raise CatalogError(str(path), f"is no list of events: {_reason(error)}") from error
+            return _feed_rows(content)
+        events = read_with_obspy(obspy.read_events, path)
+        return _each(earthquake_of, events, lambda event: str(event.resource_id))
+
+    return _usable(str(path), read, partial(CatalogError, str(path)), "is no list of events")
 
 
 def _rows_of_answer(
     url: str, rows: Callable[[bytes], Listed], query: Mapping[str, str]
-) -> list[EventRow]:
+) -> list[Earthquake]:
     """Return the earthquakes in the answer of a service or feed."""
-    content = answer(web_pool(*_PATIENCE), url, query)
+    content, shown = answer(WebPool(*_PATIENCE), url, query), public_url(url)
+    problem = f"{shown}: answers with data other than a list of events"
+    return _usable(shown, partial(rows, content), ServiceError, problem)
+
+
+def _usable(
+    source: str, read: Callable[[], Listed], fault: Callable[[str], PerError], problem: str
+) -> list[Earthquake]:
+    """Return the earthquakes of a list; its problems are warnings, a fault if nothing else is."""
     try:
-        return _rows_with_warnings(public_url(url), rows(content))
+        rows, problems = read()
+        if problems and not rows:
+            raise ValueError(problems[0])
     except (ValueError, KeyError, TypeError) as error:
-        reason = f"answers with data other than a list of events: {_reason(error)}"
-        raise ServiceError(f"{public_url(url)}: {reason}") from error
-
-
-def _rows_with_warnings(source: str, listed: Listed) -> list[EventRow]:
-    """Return the earthquakes of a list; its problems are warnings, an error if nothing else is."""
-    rows, problems = listed
-    if problems and not rows:
-        raise ValueError(problems[0])
-    for problem in problems:
-        log.warning("%s: left out: %s", source, problem)
+        raise fault(f"{problem}: {_reason(error)}") from error
+    for warning in problems:
+        log.warning("%s: left out: %s", source, warning)
     return rows
 
 
 def _each(
-    read: Callable[[Any], EventRow], entries: Iterable[Any], name: Callable[[Any], str]
+    read: Callable[[Any], Earthquake], entries: Iterable[Any], name: Callable[[Any], str] = str
 ) -> Listed:
     """Read every entry of a list alone; a fact that cannot be true is a problem of its entry."""
-    rows, problems = list[EventRow](), list[str]()
+    rows, problems = list[Earthquake](), list[str]()
     for entry in entries:
         try:
             row = read(entry)
-        except (
-            RecordRejected,
-            ValueError,
-            KeyError,
-            TypeError,
-            IndexError,
-            OverflowError,
-        ) as error:
-            problems.append(f"{shortened(name(entry), 80)}: {_reason(error)}")
-            continue
-        # A number that can be read may still be no place
-        if problem := row_problem(row):
+            problem = row.fault
+        except _FAULTS as error:
+            problem = _reason(error)
+        if problem:
             problems.append(f"{shortened(name(entry), 80)}: {problem}")
         else:
             rows.append(row)
     return rows, problems
-
-
-def _event_name(event: Event) -> str:
-    """Return the identifier of an earthquake in QuakeML."""
-    return str(event.resource_id)
 
 
 def _reason(error: Exception) -> str:
@@ -350,15 +393,15 @@ def _reason(error: Exception) -> str:
 
 def _feed_rows(content: bytes) -> Listed:
     """Return the earthquakes of a GeoJSON feed: time in ms, depth in km."""
-    return _each(_feed_row, json.loads(content)["features"], str)
+    return _each(_feed_row, json.loads(content)["features"])
 
 
-def _feed_row(feature: dict[str, Any]) -> EventRow:
+def _feed_row(feature: dict[str, Any]) -> Earthquake:
     """Return one earthquake of a GeoJSON feed, depth in m."""
     properties = feature["properties"]
     longitude, latitude, *depth = feature["geometry"]["coordinates"]
     # A feed leaves out or nulls values that its network does not know
-    return EventRow(
+    return Earthquake(
         event_id=feature["id"],
         time=iso_time(UTCDateTime(properties["time"] / 1000)),
         latitude=float(latitude),
@@ -378,10 +421,10 @@ def _text_rows(content: bytes) -> Listed:
     # A web page or an error text of the service has another first line
     if lines and not lines[0].lstrip("\ufeff# ").startswith("EventID"):
         raise ValueError(f"the first line is {lines[0]:.80}")
-    return _each(_text_row, lines[1:], str)
+    return _each(_text_row, lines[1:])
 
 
-def _text_row(line: str) -> EventRow:
+def _text_row(line: str) -> Earthquake:
     """Return one earthquake of the text format, depth from km to m."""
     cells = [cell.strip() for cell in line.split("|")]
     if len(cells) < _TEXT_COLUMNS:
@@ -389,7 +432,7 @@ def _text_row(line: str) -> EventRow:
     # Between them are author, catalogue and contributor
     event_id, time, latitude, longitude, depth = cells[:5]
     magnitude_type, magnitude = cells[9:11]
-    return EventRow(
+    return Earthquake(
         event_id,
         iso_time(UTCDateTime(time)),
         float(latitude),

@@ -8,22 +8,22 @@ from obspy import UTCDateTime
 
 from per_obspy.config import Records
 from per_obspy.records.earthquakes.choice import group_event
-from per_obspy.records.earthquakes.groups import event_groups
-from per_obspy.records.earthquakes.header_event import (
-    HeaderEvent,
+from per_obspy.records.earthquakes.earthquake import (
+    Earthquake,
     agreed_event,
     header_event,
     same_earthquake,
 )
+from per_obspy.records.earthquakes.groups import event_groups
 from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import find_path_sources, find_sources
 
 TIME = "2023-02-06T01:17:32.000000Z"
-MAIN = HeaderEvent(TIME, 37.288, 37.043, 8600.0, 7.7)
-OTHER = HeaderEvent("2023-02-06T10:24:47.000000Z", 38.089, 37.239, 7000.0, 7.6)
+MAIN = Earthquake("", TIME, 37.288, 37.043, 8600.0, 7.7)
+OTHER = Earthquake("", "2023-02-06T10:24:47.000000Z", 38.089, 37.239, 7000.0, 7.6)
 
 
-def votes(*events: HeaderEvent | None) -> list[tuple[str, HeaderEvent | None]]:
+def votes(*events: Earthquake | None) -> list[tuple[str, Earthquake | None]]:
     return [(f"TK.{number}", event) for number, event in enumerate(events)]
 
 
@@ -47,7 +47,7 @@ def test_a_station_has_one_vote_whatever_its_records():
 
 def test_facts_of_agreeing_headers_are_joined_and_the_most_frequent_taken():
     rounded = MAIN._replace(time="2023-02-06T01:17:00.000000Z", magnitude=7.6)
-    short = HeaderEvent(TIME)
+    short = Earthquake(time=TIME)
     found = agreed_event(votes(short, rounded, MAIN, MAIN))
     assert (found.event, found.stations) == (MAIN, 4)
     # a place with a depth goes before one without
@@ -65,7 +65,7 @@ def test_facts_of_agreeing_headers_are_joined_and_the_most_frequent_taken():
         ({"latitude": 37.9}, False),
         ({"magnitude": 7.0}, True),
         ({"magnitude": 6.0}, False),
-        ({"time": None, "latitude": None, "longitude": None, "magnitude": None}, True),
+        ({"time": "", "latitude": None, "longitude": None, "magnitude": None}, True),
     ],
 )
 def test_descriptions_of_one_earthquake(change, same):
@@ -145,14 +145,18 @@ def test_an_origin_at_another_time_is_no_earthquake_of_the_records(tmp_path: Pat
 #: Folder of real records -> one record of the earthquake, and what catalogues say of it: the USGS
 #: (us1000778i, us1000hyfh, nc72282711), JMA (24 January 2018, off Aomori) and AFAD (Pazarcik)
 KNOWN = {
-    ("kaikoura2016_geonet", "HSES"): HeaderEvent(
-        "2016-11-13T11:02:56.340Z", -42.7373, 173.054, 15110.0, 7.8
+    ("kaikoura2016_geonet", "HSES"): Earthquake(
+        "", "2016-11-13T11:02:56.340Z", -42.7373, 173.054, 15110.0, 7.8
     ),
-    ("cosmos", "BMR"): HeaderEvent("2018-11-30T17:29:29.330Z", 61.3464, -149.9552, 46700.0, 7.1),
-    ("cosmos", "C031"): HeaderEvent("2014-08-24T10:20:44.070Z", 38.2152, -122.3123, 11120.0, 6.0),
-    ("aomori2018_knet", "AOM001"): HeaderEvent("2018-01-24T10:51:19Z", 41.01, 142.45, 34000.0, 6.3),
-    ("afad2023", "3125"): HeaderEvent("2023-02-06T01:17:34Z", 37.226, 37.014, 10000.0, 7.8),
-    ("itaca2009", "2987"): HeaderEvent("2009-04-06T01:32:40Z", 42.342, 13.380, 8300.0, 6.3),
+    ("cosmos", "BMR"): Earthquake("", "2018-11-30T17:29:29.330Z", 61.3464, -149.9552, 46700.0, 7.1),
+    ("cosmos", "C031"): Earthquake(
+        "", "2014-08-24T10:20:44.070Z", 38.2152, -122.3123, 11120.0, 6.0
+    ),
+    ("aomori2018_knet", "AOM001"): Earthquake(
+        "", "2018-01-24T10:51:19Z", 41.01, 142.45, 34000.0, 6.3
+    ),
+    ("afad2023", "3125"): Earthquake("", "2023-02-06T01:17:34Z", 37.226, 37.014, 10000.0, 7.8),
+    ("itaca2009", "2987"): Earthquake("", "2009-04-06T01:32:40Z", 42.342, 13.380, 8300.0, 6.3),
 }
 
 

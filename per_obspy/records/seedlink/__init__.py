@@ -1,1 +1,0 @@
-"""Records of the last hours from SeedLink servers, which archives may not have yet."""
