@@ -153,7 +153,7 @@ def watch(
     """
     with logged(log, log_format, quiet, timed=not once) as progress:
         from per_obspy.jobs.executor import on_cluster
-        from per_obspy.operation.events.event_settings import read_settings
+        from per_obspy.operation.event_settings import read_settings
         from per_obspy.operation.watch import watch_forever, watch_once
 
         settings = on_cluster(read_settings(configuration), dask)

@@ -15,11 +15,10 @@ from typing import Any
 from per_obspy.errors import shortened
 from per_obspy.files import remove_file, written_whole
 from per_obspy.jobs.output_folder import RECORD, Result
-from per_obspy.operation.events.event_settings import Watcher
-from per_obspy.operation.events.failures import known_fault
-from per_obspy.operation.events.revisions import WORK, revision_folder
-from per_obspy.operation.events.state import EventState, event_folder
+from per_obspy.operation.event_settings import Watcher
 from per_obspy.operation.notified_run import notify_failure, notify_result
+from per_obspy.operation.revisions import WORK, revision_folder
+from per_obspy.operation.state import EventState, event_folder, known_fault
 
 log = logging.getLogger(__name__)
 

@@ -4,7 +4,7 @@ import pytest
 from fdsn_server import serving
 from watched_city import City, FakeClock, city_earthquake, quick_run
 
-from per_obspy.operation.events import event_feed, event_run
+from per_obspy.operation import event_feed, event_run
 
 from ..pipeline.small_run import InProcess
 

@@ -12,8 +12,7 @@ import pytest
 from per_obspy.files import file_hash
 from per_obspy.jobs.output_folder import file_hashes
 from per_obspy.operation import health
-from per_obspy.operation.health import folder_health
-from per_obspy.operation.status import WatchStatus, write_status
+from per_obspy.operation.health import WatchStatus, folder_health, write_status
 from per_obspy.resume import write_status as write_record
 
 DUE = "2099-01-01T00:00:00+00:00"

@@ -6,7 +6,7 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import is_part
-from per_obspy.operation.status import WatchStatus, read_status, write_status
+from per_obspy.operation.health import WatchStatus, read_status, write_status
 
 
 def test_what_was_written_is_read(tmp_path):

@@ -1,8 +1,8 @@
 """A watcher and a service on loopback, by a clock of the test: every result is kept.
 
-Tests ``per_obspy.operation.polling``, ``per_obspy.operation.events.event_feed``,
-``per_obspy.operation.events.event_run``, ``per_obspy.operation.events.failures`` and
-``per_obspy.operation.events.open_events`` as well.
+Tests ``per_obspy.operation.watch``, ``per_obspy.operation.event_feed``,
+``per_obspy.operation.event_run``, ``per_obspy.operation.state`` and
+``per_obspy.operation.open_events`` as well.
 """
 
 import errno
@@ -28,11 +28,9 @@ from watched_city import (
 from per_obspy.config import Notify, Reach
 from per_obspy.errors import CatalogError, FolderInUse, ServiceError, TryLater, WriteError
 from per_obspy.files import file_hash
-from per_obspy.operation import watch
-from per_obspy.operation.events import event_run
-from per_obspy.operation.events.state import read_event_states
-from per_obspy.operation.health import folder_health
-from per_obspy.operation.status import read_status
+from per_obspy.operation import event_run, watch
+from per_obspy.operation.health import folder_health, read_status
+from per_obspy.operation.state import read_event_states
 from per_obspy.operation.watch import watch_forever
 from per_obspy.pipeline.inputs.described_runs import result_facts
 from per_obspy.pipeline.run import run
@@ -252,7 +250,7 @@ def test_a_kill_around_a_revision_neither_repeats_nor_reuses_its_number(
     server.events["xx1"] = magnified(simulation, 7.2)
     module = watch if place == "keep" else event_run
     if place == "point_latest":
-        from per_obspy.operation.events import revisions as module
+        from per_obspy.operation import revisions as module
 
     def killed(*_, **__):
         raise KeyboardInterrupt

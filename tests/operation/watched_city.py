@@ -13,8 +13,8 @@ from obspy.core.event import Event, Magnitude, Origin
 from per_obspy.config import Run, Scenario
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.jobs.output_folder import Result, file_hashes, recorded
-from per_obspy.operation.events.event_settings import read_settings
-from per_obspy.operation.events.state import EventState, read_event_states
+from per_obspy.operation.event_settings import read_settings
+from per_obspy.operation.state import EventState, read_event_states
 from per_obspy.operation.watch import Clock, Pass, watch_once
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations

@@ -4,8 +4,7 @@ import pytest
 from fdsn_server import content, serving, status
 from watched_city import city_earthquake, write_city
 
-from per_obspy.operation import watch
-from per_obspy.operation.events import event_feed
+from per_obspy.operation import event_feed, watch
 
 
 @pytest.fixture

@@ -1,24 +1,33 @@
 """
-State of a watched folder and of each earthquake in it: JSON files, replaced atomically.
+State of a watched folder and of each earthquake in it: what is known, due, done and failed.
 
-A folder that is watched into holds ``watch.json``, ``status.json`` and ``events/ID/``. The folder
-of an earthquake holds ``event.json`` (its state), ``event.xml`` (QuakeML as it was screened
-last), ``records/``, ``work/`` (the output folder of its runs), ``revisions/`` and ``latest``.
+State is JSON files that are replaced atomically. A folder that is watched into holds
+``watch.json``, ``status.json`` and ``events/ID/``. The folder of an earthquake holds ``event.json``
+(its state), ``event.xml`` (QuakeML as it was screened last), ``records/``, ``work/`` (the output
+folder of its runs), ``revisions/`` and ``latest``.
+
+Runs are counted by their delay after the origin time. A clock that jumps ahead makes several delays
+due at once, which one run serves; a clock that is put back makes those due again that were done at
+times still to come.
 """
 
 import json
-from datetime import UTC, datetime
+import logging
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
 from per_obspy.config.section import Moment, Section
-from per_obspy.errors import CatalogError, reason_of, shortened
+from per_obspy.errors import CatalogError, MachineFault, PerError, TryLater, reason_of, shortened
 from per_obspy.files import written_whole
+from per_obspy.machine import machine_fault
 from per_obspy.names import inside
 from per_obspy.records.earthquakes.earthquake import Earthquake
 from per_obspy.records.earthquakes.quakeml import file_name
+from per_obspy.records.fdsn.web import PassingFault
 
 #: State files of a watched folder and of an earthquake.
 WATCH, EVENT = "watch.json", "event.json"
@@ -268,3 +277,170 @@ def _read(file: Path, kind: type[StateType]) -> StateType:
     except (OSError, ValueError) as error:
         problem = f"cannot be read: {shortened(reason_of(error), 200)}"
         raise CatalogError(str(file), problem) from error
+
+
+#: Pauses after failures, s: the shortest, which doubles, and the longest.
+SHORTEST_PAUSE, LONGEST_PAUSE = 60.0, 3600.0
+
+#: Failure that holds up only its own repetition: the run was done with what there is.
+INCOMPLETE = "services of records did not answer everything: asked again"
+
+#: Difference between two clocks that is no jump, s.
+TOLERANCE = 60.0
+
+
+class Task(NamedTuple):
+    """
+    A run that is due.
+
+    Attributes
+    ----------
+    delay : float
+        Latest delay that has passed, s after the origin time.
+    reasons : tuple of str
+        ``"delay"``, ``"update"``, ``"records"`` and ``"retry"``, as many as apply.
+    """
+
+    delay: float
+    reasons: tuple[str, ...]
+
+
+def due_task(
+    now: datetime, state: EventState, delays: Sequence[float], has_arrivals: bool = False
+) -> Task | None:
+    """
+    Return the due run of an earthquake, None if no run is due.
+
+    Parameters
+    ----------
+    now : datetime
+        With its zone.
+    state : EventState
+        Of the earthquake.
+    delays : sequence of float
+        s, rising.
+    has_arrivals : bool
+        Whether records have come or changed since the latest run.
+    """
+    passed = passed_delays(now, state, delays)
+    if state.state == "closed" or not passed or is_held(now, state):
+        return None
+    # A finished earthquake is screened again only if it is updated
+    is_open = state.state == "open"
+    conditions = {
+        "delay": is_open and not is_done(now, state, passed[-1]),
+        "update": state.changed,
+        "records": is_open and has_arrivals,
+        "retry": is_open and not is_paused(now, state.not_before) and _is_unfinished(state),
+    }
+    reasons = tuple(name for name, holds in conditions.items() if holds)
+    return Task(passed[-1], reasons) if reasons else None
+
+
+def _is_unfinished(state: EventState) -> bool:
+    """Return whether the latest run has failed, or lacked an answer of a service."""
+    return not state.complete or state.failures > 0
+
+
+def is_held(now: datetime, state: EventState) -> bool:
+    """Return whether no run of an earthquake is tried, because the latest one failed."""
+    return state.last_error != INCOMPLETE and is_paused(now, state.not_before)
+
+
+def passed_delays(now: datetime, state: EventState, delays: Sequence[float]) -> list[float]:
+    """Return the delays that have passed since the origin time, s."""
+    elapsed = (now - moment(state.time)).total_seconds()
+    return [delay for delay in delays if delay <= elapsed]
+
+
+def is_done(now: datetime, state: EventState, delay: float) -> bool:
+    """Return whether the run of a delay was done, not counting times in the future."""
+    time = state.done.get(f"{delay:g}")
+    return time is not None and moment(time) <= now + timedelta(seconds=TOLERANCE)
+
+
+def is_paused(now: datetime, not_before: str | None) -> bool:
+    """Return whether a pause lasts; too long a pause was set by a wrong clock and is ignored."""
+    if not_before is None:
+        return False
+    return 0 < (moment(not_before) - now).total_seconds() <= LONGEST_PAUSE
+
+
+def pause(failures: int, demanded: float | None = None) -> float:
+    """
+    Return the pause after some failures in succession, s.
+
+    Parameters
+    ----------
+    failures : int
+        One or more.
+    demanded : float, optional
+        Pause that a service demands by ``Retry-After``, s.
+
+    Examples
+    --------
+    >>> [pause(number) for number in (1, 2, 3, 100)], pause(1, 300.0)
+    ([60.0, 120.0, 240.0, 3600.0], 300.0)
+    """
+    usual = SHORTEST_PAUSE * 2.0 ** min(max(failures - 1, 0), 10)
+    return min(max(usual, demanded or 0.0), LONGEST_PAUSE)
+
+
+def next_due(now: datetime, state: EventState, delays: Sequence[float]) -> datetime | None:
+    """Return the next time at which a run of an earthquake may be due, None if no run is left."""
+    if state.state != "open":
+        return None
+    # A delay that has passed without its run is due now, or after the pause
+    origin = moment(state.time)
+    times = [
+        origin + timedelta(seconds=delay) for delay in delays if not is_done(now, state, delay)
+    ]
+    pending = [time for time in times if time > now]
+    unpaused = state.model_copy(update={"not_before": None})
+    if due_task(now, unpaused, delays) is not None:
+        waits = state.not_before is not None and is_paused(now, state.not_before)
+        pending.append(moment(state.not_before or "") if waits else now)
+    return min(pending, default=None)
+
+
+log = logging.getLogger(__name__)
+
+
+def known_fault(error: Exception) -> PerError:
+    """Convert any error to one for users; log the traceback of a programming error."""
+    # A missing file of the configuration is a wrong name, as for other commands
+    fault = machine_fault(error, missing=not isinstance(error, PerError))
+    if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):
+        return error
+    if fault is not None:
+        return fault
+    log.error("an error of the program", exc_info=error)
+    return MachineFault(shortened(f"{type(error).__name__}: {error}"))
+
+
+def after_pause(now: datetime, failures: int, fault: PerError | None) -> str:
+    """
+    Return the time after the pause that follows some failures in succession.
+
+    Parameters
+    ----------
+    now : datetime
+        Time of the latest failure.
+    failures : int
+        At least 1.
+    fault : PerError or None
+        The latest failure; a service may demand a longer pause.
+    """
+    demanded = fault.pause if isinstance(fault, PassingFault) else None
+    return iso(now + timedelta(seconds=pause(failures, demanded)))
+
+
+def failed(state: EventState, reason: str, now: datetime, fault: PerError | None) -> EventState:
+    """Return the state of an earthquake after a failure: it is tried again after a pause."""
+    failures = state.failures + 1
+    return changed(
+        state,
+        failures=failures,
+        not_before=after_pause(now, failures, fault),
+        last_error=shortened(reason),
+    )

@@ -10,9 +10,9 @@ from obspy import UTCDateTime
 from watched_city import ORIGIN
 
 from per_obspy.operation import watch
-from per_obspy.operation.events.event_settings import Watcher
-from per_obspy.operation.events.late_records import is_look_due
-from per_obspy.operation.events.state import EventState, changed, iso
+from per_obspy.operation.event_run import is_look_due
+from per_obspy.operation.event_settings import Watcher
+from per_obspy.operation.state import EventState, changed, iso
 from per_obspy.progress import silent
 
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from per_obspy.operation.events.state import (
+from per_obspy.operation.state import (
     EventState,
     WatchState,
     event_folder,

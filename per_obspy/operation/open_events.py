@@ -10,9 +10,9 @@ import numpy as np
 from per_obspy.config import Watch
 from per_obspy.errors import shortened
 from per_obspy.files import content_hash
-from per_obspy.operation.events.event_feed import Feed, present_event
-from per_obspy.operation.events.relevance import Places, distances, matters
-from per_obspy.operation.events.state import EventState, changed, iso, moment
+from per_obspy.operation.event_feed import Feed, present_event
+from per_obspy.operation.relevance import Places, distances, matters
+from per_obspy.operation.state import EventState, changed, iso, moment
 from per_obspy.records.earthquakes.earthquake import Earthquake
 
 log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from obspy.geodetics import locations2degrees
 from per_obspy.config import Pairs, Reach, Records, Run, Watch
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
-from per_obspy.operation.events.relevance import (
+from per_obspy.operation.relevance import (
     CELL,
     PLACES,
     Places,

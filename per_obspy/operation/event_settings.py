@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from per_obspy.config import Fdsn, Records, Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
-from per_obspy.operation.events.relevance import Places
-from per_obspy.operation.events.state import EventState, moment
+from per_obspy.operation.relevance import Places
+from per_obspy.operation.state import EventState, moment
 from per_obspy.progress import Progress
 from per_obspy.records.fdsn.providers import ROUTERS, base_url
 

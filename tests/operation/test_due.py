@@ -4,8 +4,16 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from per_obspy.operation.events.due import LONGEST_PAUSE, Task, due_task, next_due, pause
-from per_obspy.operation.events.state import EventState, changed, iso
+from per_obspy.operation.state import (
+    LONGEST_PAUSE,
+    EventState,
+    Task,
+    changed,
+    due_task,
+    iso,
+    next_due,
+    pause,
+)
 
 ORIGIN = datetime(2026, 11, 23, 1, tzinfo=UTC)
 DELAYS = (120.0, 300.0, 900.0)

@@ -7,8 +7,8 @@ import pytest
 
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError
-from per_obspy.operation.events.event_settings import read_settings, settings_of_event
-from per_obspy.operation.events.state import EventState
+from per_obspy.operation.event_settings import read_settings, settings_of_event
+from per_obspy.operation.state import EventState
 
 TEXT = """\
 name = "city"

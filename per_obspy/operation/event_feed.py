@@ -11,8 +11,8 @@ from per_obspy.config import Watch
 from per_obspy.errors import CatalogError, RecordRejected, ServiceError, reason_of, shortened
 from per_obspy.files import is_part
 from per_obspy.names import public_url
-from per_obspy.operation.events.relevance import Circle
-from per_obspy.operation.events.state import WatchState, iso, moment
+from per_obspy.operation.relevance import Circle
+from per_obspy.operation.state import WatchState, iso, moment
 from per_obspy.records.earthquakes.earthquake import Earthquake
 from per_obspy.records.earthquakes.quakeml import (
     earthquake_of,

@@ -1,6 +1,6 @@
 """Revisions: whole or not there, numbers used once, and only real changes in changes.csv.
 
-The table is that of ``per_obspy.operation.events.revision_changes``.
+The table is that of ``per_obspy.operation.revisions``.
 """
 
 import csv
@@ -11,14 +11,14 @@ import pytest
 
 from per_obspy.errors import CatalogError, WriteError
 from per_obspy.jobs.output_folder import file_hashes
-from per_obspy.operation.events import revisions
-from per_obspy.operation.events.revision_changes import write_changes
-from per_obspy.operation.events.revisions import (
+from per_obspy.operation import revisions
+from per_obspy.operation.revisions import (
     content_of,
     newest_revision,
     point_latest,
     publish,
     shown_content,
+    write_changes,
 )
 
 

@@ -1,1 +1,0 @@
-"""Watched earthquakes: lists, states, due runs and revisions of results."""
