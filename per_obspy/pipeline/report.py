@@ -25,6 +25,7 @@ from per_obspy.pipeline.results.report_files import (
     with_areas,
     with_page_data,
     write_files,
+    write_overview,
 )
 from per_obspy.pipeline.results.run_facts import event_of_run, read_stations, revision_of_run
 from per_obspy.pipeline.stations import simulated_motion
@@ -128,6 +129,7 @@ def _report_pairs(
     # Totals, layers and the comparison with observations need no record
     report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
     write_files(results, folder, settings.spreadsheet, report)
+    write_overview(results, folder, report)
     _draw_worst_pair(worst, stations, folder, report)
     with report.tried(folder / "report.html"):
         page = with_page_data(results, folder, outlines)

@@ -323,7 +323,7 @@ def _count_hit(file: pq.ParquetFile) -> int:
 
 def write_files(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
     """
-    Write summary, KML, workbook and overview; a file that fails leaves the others.
+    Write summary, KML and workbook; a file that fails leaves the others.
 
     Parameters
     ----------
@@ -349,10 +349,13 @@ def write_files(results: Results, folder: Path, spreadsheet: bool, report: Repor
         with report.tried(folder / f"{stem}.xlsx"):
             sheets = _sheets(results, _extent(results, folder, SHEET_ROWS))
             write_workbook(sheets, folder / f"{stem}.xlsx")
-    # The map of all pairs
+
+
+def write_overview(results: Results, folder: Path, report: Report) -> None:
+    """Draw the map of all pairs."""
     overview = folder / "figures" / "overview.png"
     with report.tried(overview):
-        draw_overview(results.shown, region, overview)
+        draw_overview(results.shown, results.region, overview)
 
 
 def _extent(results: Results, folder: Path, most: int) -> str:

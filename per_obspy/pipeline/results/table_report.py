@@ -20,6 +20,7 @@ from per_obspy.pipeline.results.report_files import (
     read_table,
     with_page_data,
     write_files,
+    write_overview,
 )
 from per_obspy.pipeline.results.scenario_runs import ScenarioRuns
 from per_obspy.report.page.document import write_page
@@ -140,6 +141,7 @@ def _write(
         drawings = Drawings(histories=histories(results.worst) if histories else {})
         page = replace(with_page_data(results, folder, outlines), drawings=drawings)
         write_page(page, folder / "report.html")
+    write_overview(results, folder, report)
     return report
 
 
