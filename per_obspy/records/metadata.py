@@ -475,24 +475,6 @@ def _ground(identifier: str, comments: Sequence[str]) -> Mapping[str, str | floa
     return ground
 
 
-def _comment_words(trace: Trace, inventory: Inventory | None) -> dict[str, str]:
-    """Return the ``name=value`` comments of a trace's station."""
-    words = {}
-    for station in _stations(trace, inventory):
-        for comment in station.comments:
-            name, _, value = (comment.value or "").partition("=")
-            words[name.strip()] = value.strip()
-    return words
-
-
-def _is_simulated(trace: Trace, inventory: Inventory | None) -> bool:
-    """Return whether the trace's station is one that this package simulated, by its comment."""
-    for station in _stations(trace, inventory):
-        if any((comment.value or "").startswith(SIMULATION_MARK) for comment in station.comments):
-            return True
-    return False
-
-
 def _samples(trace: Trace) -> FloatArray:
     """Return the samples in double precision; all must be finite."""
     samples = np.asarray(trace.data, dtype=np.float64)
