@@ -3,7 +3,9 @@
 import errno
 import math
 import os
+import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import PurePath
 
 from per_obspy.errors import MachineFault, TryLater
@@ -56,6 +58,17 @@ def raise_machine_fault(error: BaseException) -> None:
     fault = machine_fault(error)
     if fault is not None:
         raise fault from error
+
+
+@contextmanager
+def machine_faults() -> Iterator[None]:
+    """Raise the fault of the machine from which an error of the block was raised, if any."""
+    try:
+        yield
+    finally:
+        error = sys.exception()
+        if isinstance(error, Exception) and not isinstance(error, TryLater):
+            raise_machine_fault(error)
 
 
 def _causes(error: BaseException) -> Iterator[BaseException]:

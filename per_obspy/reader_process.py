@@ -147,22 +147,22 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
 
         clock = threading.Timer(limits.seconds * _PATIENCE, stop)
         clock.start()
+        is_whole = False
         try:
             pickle.dump((limits, str(Path.cwd()), function, arguments), calls, protocol=5)
             calls.flush()
             is_value, answer = pickle.load(answers)  # noqa: S301 - of our own process
             # Memory that was short may not be free again
-            if isinstance(answer, MemoryError):
-                _reader.end()
+            is_whole = not isinstance(answer, MemoryError)
         except (EOFError, BrokenPipeError, pickle.UnpicklingError) as error:
             code = _reader.end(is_killed=False)
+            is_whole = True
             raise BeyondLimits(_reason(limits, code, late.is_set())) from error
-        except BaseException:
-            # The rest of an answer must not be taken for the next one
-            _reader.end()
-            raise
         finally:
             clock.cancel()
+            # The rest of an answer must not be taken for the next one
+            if not is_whole:
+                _reader.end()
     if is_value:
         return answer
     if isinstance(answer, MemoryError):
@@ -196,17 +196,18 @@ def _serve() -> None:
         except MemoryError as error:
             answer = (False, error)
         except Exception as error:  # noqa: BLE001 - it is raised where the call came from
-            answer = (False, _sendable(error))
+            answer = (False, sendable(error))
         _limit(None)
         pickle.dump(answer, answers, protocol=5)
         answers.flush()
 
 
-def _sendable(error: Exception) -> Exception:
+def sendable(error: Exception) -> Exception:
     """Return an error that can be pickled."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - an error of this process
-    except Exception:  # noqa: BLE001 - errors of other packages may be of any kind
+    except (pickle.PickleError, AttributeError, LookupError, RuntimeError, TypeError, ValueError):
+        # Classes of other packages that cannot be made of their arguments
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error.with_traceback(None)
 

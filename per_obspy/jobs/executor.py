@@ -121,14 +121,12 @@ def engine_facts(executor: Executor | None) -> dict[str, Any]:
 
 @contextmanager
 def noted_engine(record: Path, executor: Executor | None) -> Iterator[None]:
-    """Add workers and events of a cluster to ``run.json`` if an error ends the run."""
+    """Add workers and events of a cluster to ``run.json``, whether an error ends the run or not."""
     try:
         yield
-    except Exception:
-        facts = engine_facts(executor)
-        if facts:
+    finally:
+        if facts := engine_facts(executor):
             _add(record, facts)
-        raise
 
 
 def _add(record: Path, facts: dict[str, Any]) -> None:

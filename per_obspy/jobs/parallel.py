@@ -32,7 +32,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError, WrongOutput
 from per_obspy.jobs.worker_start import start_server, worker_context
-from per_obspy.machine import machine_fault, raise_machine_fault
+from per_obspy.machine import machine_fault, machine_faults
 from per_obspy.termination import held
 from per_obspy.threads import use_one_thread
 
@@ -284,14 +284,8 @@ def _on(
 
 def _done(do: Do[Task, Result], task: Task) -> Result:
     """Do a task; raise errors caused by the machine as machine faults: processes drop causes."""
-    try:
-        with _ONE_TASK:
-            return do(task)
-    except TryLater:
-        raise
-    except Exception as error:
-        raise_machine_fault(error)
-        raise
+    with _ONE_TASK, machine_faults():
+        return do(task)
 
 
 def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:

@@ -12,13 +12,13 @@ import logging
 from pathlib import Path
 from typing import Any
 
-from per_obspy.errors import shortened
+from per_obspy.errors import PerError, shortened
 from per_obspy.files import remove_file, written_whole
 from per_obspy.jobs.output_folder import RECORD, Result
 from per_obspy.operation.event_settings import Watcher
 from per_obspy.operation.notified_run import notify_failure, notify_result
 from per_obspy.operation.revisions import WORK, revision_folder
-from per_obspy.operation.state import EventState, event_folder, known_fault
+from per_obspy.operation.state import EventState, event_folder, noted_faults
 
 log = logging.getLogger(__name__)
 
@@ -61,10 +61,11 @@ def deliver(watcher: Watcher, state: EventState) -> None:
         return
     content = _content(file) or {}
     # A result that cannot be read holds up no later message
-    try:
+    faults = list[PerError]()
+    with noted_faults(faults):
         _deliver(watcher, state, content)
-    except Exception as error:  # noqa: BLE001 - a message stops no watcher
-        log.warning("message about %s: %s", shortened(state.event_id, 80), known_fault(error))
+    for fault in faults:
+        log.warning("message about %s: %s", shortened(state.event_id, 80), fault)
     remove_file(file)
 
 

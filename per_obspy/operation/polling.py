@@ -21,8 +21,8 @@ from per_obspy.operation.state import (
     after_pause,
     event_folder,
     is_paused,
-    known_fault,
     moment,
+    noted_faults,
     read_watch_state,
     write_event_state,
     write_watch_state,
@@ -47,12 +47,12 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
     if is_paused(now, state.not_before):
         errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
         return state
-    try:
+    faults = list[PerError]()
+    with noted_faults(faults):
         feed = read_feed(watch, state, _circle(watcher), now)
-    except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for the list
-        fault = known_fault(error)
-        errors.append(fault)
-        state = _failed_poll(state, fault, now)
+    errors += faults
+    if faults:
+        state = _failed_poll(state, faults[0], now)
     else:
         errors += _problems(watch, feed)
         judgement = judged_feed(watch, watcher.places, states, feed, now)
@@ -127,10 +127,11 @@ def confirm(watcher: Watcher, states: dict[str, EventState], errors: list[PerErr
         recent = 0.0 <= elapsed < watch.confirm
         if state.state != "open" or recent or is_paused(now, state.not_before):
             continue
-        try:
+        faults = list[PerError]()
+        with noted_faults(faults):
             present = present_state(watch, watcher.places, state, now)
-        except Exception as error:  # noqa: BLE001 - the other earthquakes are confirmed
-            errors.append(known_fault(error))
-            # The service of all others fails as well
+        # The service of all others fails as well
+        if faults:
+            errors += faults
             return
         keep(watcher, states, present)

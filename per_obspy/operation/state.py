@@ -13,7 +13,8 @@ times still to come.
 
 import json
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -406,7 +407,16 @@ def next_due(now: datetime, state: EventState, delays: Sequence[float]) -> datet
 log = logging.getLogger(__name__)
 
 
-def known_fault(error: Exception) -> PerError:
+@contextmanager
+def noted_faults(errors: list[PerError]) -> Iterator[None]:
+    """Add whatever prevents a block to the errors of a pass: nothing else waits for it."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 - of a service, a run or a way of delivery
+        errors.append(_known_fault(error))
+
+
+def _known_fault(error: Exception) -> PerError:
     """Convert any error to one for users; log the traceback of a programming error."""
     # A missing file of the configuration is a wrong name, as for other commands
     fault = machine_fault(error, missing=not isinstance(error, PerError))

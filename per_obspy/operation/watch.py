@@ -36,9 +36,9 @@ from per_obspy.operation.state import (
     failed,
     ignored_lines,
     iso,
-    known_fault,
     moment,
     next_due,
+    noted_faults,
     pause,
     read_event_states,
 )
@@ -198,11 +198,9 @@ def _records_that_came(
     for state in list(states.values()):
         if not is_look_due(watcher, state) or termination.requested():
             continue
-        try:
+        after, has_come = changed(state, looked=iso(watcher.now())), False
+        with noted_faults(errors):
             after, has_come = looked(watcher, state)
-        except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for these
-            errors.append(known_fault(error))
-            after, has_come = changed(state, looked=iso(watcher.now())), False
         keep(watcher, states, after)
         if has_come:
             come.add(state.event_id)
@@ -240,10 +238,10 @@ def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerEr
     """Do the run of an earthquake, write its state, and notify people; a failure is noted."""
     name = shortened(state.event_id, 80)
     log.info("%s: run at %g s for %s", name, task.delay, " and ".join(task.reasons))
-    try:
+    faults = list[PerError]()
+    with noted_faults(faults):
         done = done_task(watcher, state, task)
-    except Exception as error:  # noqa: BLE001 - the other earthquakes have their runs
-        fault = known_fault(error)
+    for fault in faults:
         errors.append(fault)
         log.error("%s: %s", name, fault)
         return _failure(watcher, failed(state, str(fault), watcher.now(), fault))

@@ -5,6 +5,7 @@ The parts share few kernels, so that processes can compile them next to each oth
 """
 
 import gc
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Thread
@@ -116,11 +117,10 @@ def compiling(progress: Progress) -> Iterator[None]:
     try:
         yield
         progress(COMPILING, 0, 1)
-    except Exception:
+    finally:
         # A thread that is alive when the interpreter ends can abort it; an interrupt does not wait
-        thread.join()
-        raise
-    thread.join()
+        if not isinstance(sys.exception(), KeyboardInterrupt | SystemExit):
+            thread.join()
     progress(COMPILING, 1, 1)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pyarrow.dataset import Dataset, dataset
 from pyarrow.fs import LocalFileSystem
 
-from per_obspy.errors import MachineFault
+from per_obspy.errors import MachineFault, PerError
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.ranking import KEYS
 from per_obspy.tables.table_files import as_arrow
@@ -35,6 +35,9 @@ TOGETHER = 10_000
 
 #: Parts that are read side by side; more of them are merged to longer ones first.
 MOST_PARTS = 64
+
+#: Errors that a query ends with: of the database, of what reads its rows, of what they are for.
+_ENDS = (duckdb.Error, pa.ArrowException, PerError, OSError, RuntimeError, ValueError)
 
 #: Column with the number of the part to which a row belongs.
 _PART = "order_part"
@@ -67,7 +70,7 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
                 # Without this its threads go on with the query, which waits for them
                 with interrupted_by_signals(database.interrupt):
                     yield database
-            except Exception as error:
+            except _ENDS as error:
                 raise_swallowed_end(error)
                 if _is_out_of_memory(error):
                     reason = f"{folder}: not enough memory to join the rows"

@@ -415,15 +415,21 @@ class DaskExecutor(ElasticExecutor):
         """Poll the workers; without any for too long the cluster counts as broken."""
         seen = time.monotonic()
         while not self._closed.wait(LOOK):
-            try:
+            with self._at_scheduler(passing=("running", "connecting")):
                 self._look()
-            except Exception as error:  # noqa: BLE001 - of network and scheduler, of any class
-                if self._client.status not in ("running", "connecting"):
-                    self._break(f"the scheduler {self.address} is gone: {error}")
             if self.workers.fit():
                 seen = time.monotonic()
             elif self._pending and time.monotonic() - seen > self._engine.wait:
                 self._break(self._no_worker())
+
+    @contextmanager
+    def _at_scheduler(self, passing: tuple[str, ...] = ()) -> Iterator[None]:
+        """Fail all tasks if the client loses its scheduler; states in which an error passes."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - of network and scheduler, of any class
+            if self._client.status not in passing:
+                self._break(f"the scheduler {self.address} is gone: {error}")
 
     def _break(self, reason: str) -> None:
         """Fail all tasks: none of them can be done."""
@@ -442,14 +448,11 @@ class DaskExecutor(ElasticExecutor):
         where: dict[str, Any] = {}
         if self.workers.unfit():
             where = {"workers": list(self.workers.fit()), "allow_other_workers": True}
-        try:
+        with self._at_scheduler():
             executor = self._client.get_executor(pure=False, retries=self._engine.retries)
             future = executor.submit(do_sent, sent.task, **where)
-        except Exception as error:  # noqa: BLE001 - a client that lost its scheduler
-            self._break(f"the scheduler {self.address} is gone: {error}")
-            return
-        sent.result.add_done_callback(lambda one: future.cancel() if one.cancelled() else None)
-        future.add_done_callback(partial(self._finish, sent))
+            sent.result.add_done_callback(lambda one: future.cancel() if one.cancelled() else None)
+            future.add_done_callback(partial(self._finish, sent))
 
     def _finish(self, sent: _Sent, future: Future[Outcome]) -> None:
         """Pass on the outcome of a task, or try again."""

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from per_obspy.errors import MachineFault
 from per_obspy.files import bytes_hash, written_whole
+from per_obspy.reader_process import sendable
 from per_obspy.threads import use_one_thread
 
 #: Tasks of at most this many bytes travel through the scheduler, larger ones by the shared folder.
@@ -183,7 +184,7 @@ def do_sent(task: SentTask) -> Outcome:
             try:
                 value = _received(task)()
             except Exception as raised:  # noqa: BLE001 - the client judges every error
-                error = _portable(raised)
+                error = sendable(raised)
             # Whatever was found is in doubt if the folder went away meanwhile
             refusal = _lost_folder(task.shared)
     if refusal:
@@ -233,12 +234,3 @@ def _received(task: SentTask) -> Any:
         if bytes_hash(content) != task.hash:
             raise MachineFault(f"{task.file}: changed after it was written")
     return pickle.loads(content)  # noqa: S301 - from the client itself, by message or by hash
-
-
-def _portable(error: Exception) -> Exception:
-    """Return an error that can be sent to another process."""
-    try:
-        pickle.loads(pickle.dumps(error))  # noqa: S301 - pickled here
-    except Exception:  # noqa: BLE001 - errors of libraries may have arguments of any kind
-        return RuntimeError(f"{type(error).__name__}: {error}")
-    return error
