@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test workflows rehearsal check docs wheel benchmark extras constraints clean
+.PHONY: demo figures test test-long workflows rehearsal check docs wheel benchmark extras constraints clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -20,8 +20,12 @@ figures: .venv/run
 	$(BIN)/python workflows/readme_figures.py
 
 test: .venv/test
-	@echo "== tests, doctests and README; make workflows has the rest"
-	$(BIN)/python -m pytest -q -n auto --dist worksteal --ignore tests/workflows/test_snakefile.py
+	@echo "== tests and doctests; make test-long and make workflows have the rest"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not long" --ignore tests/workflows/test_snakefile.py
+
+test-long: .venv/test
+	@echo "== damaged copies of every format, killed runs and watchers, whole earthquakes, the blocks of README and docs"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m long --ignore tests/workflows/test_snakefile.py tests
 	@echo "== the kernels' tests once more without the compiler"
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist worksteal tests/kernels
 

@@ -17,6 +17,8 @@ from per_obspy import cli
 from per_obspy.config import Design, Ensemble, Run, Simulation
 from per_obspy.config.pairs import TableForm
 
+pytestmark = pytest.mark.long
+
 #: Pages whose files other pages use come first.
 FIRST = ("docs/start/assessment.md", "docs/start/planner.md")
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 HERE = Path(__file__).parent
 
 #: Damaged copies of every kind of file; by hand thousands are read, see ``docs/security.md``.

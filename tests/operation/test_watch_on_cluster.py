@@ -15,6 +15,8 @@ pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
 from per_obspy.jobs.cluster import dask_executor
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def server():

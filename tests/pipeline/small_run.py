@@ -15,6 +15,7 @@ import pytest
 from per_obspy.files import written_whole
 from per_obspy.pipeline import report
 from per_obspy.pipeline.results import report_files
+from per_obspy.report.results import Drawings
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -60,11 +61,12 @@ def plain_figure(*arguments: object) -> None:
         part.write_bytes(b"a figure")
 
 
-#: Functions that draw, and those that write short files instead; the page is the last.
+#: Functions that draw, and those that write short files instead; those of the page are the last.
 PLAIN = (
     (report_files, "draw_overview", plain_figure),
     (report, "draw_record_to_pair", plain_figure),
     (report_files, "write_summary_page", plain_figure),
+    (report, "page_drawings", lambda *_: Drawings()),
     (report, "write_page", plain_figure),
 )
 REAL = tuple((module, name, getattr(module, name)) for module, name, _ in PLAIN)
@@ -81,7 +83,7 @@ def replaced(functions: Iterable[tuple[object, str, object]]) -> Iterator[None]:
 
 def plain_figures() -> AbstractContextManager[None]:
     """Write the figures and the PDF of every run in here as short files."""
-    return replaced(PLAIN[:-1])
+    return replaced(PLAIN[:-2])
 
 
 def plain_reports() -> AbstractContextManager[None]:

@@ -47,7 +47,7 @@ FILES = (
 )
 
 
-pytestmark = pytest.mark.usefixtures("plain_reports")
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("plain_reports")]
 
 
 @pytest.fixture(scope="module")

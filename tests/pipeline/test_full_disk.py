@@ -65,7 +65,7 @@ def no_room(size: int):
         reader_process._reader.end()
 
 
-pytestmark = pytest.mark.usefixtures("plain_reports")
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("plain_reports")]
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,8 @@ from per_obspy.simulation.earthquake import simulate, write_simulation
 
 from .small_run import SPECTRA, plain_reports
 
+pytestmark = pytest.mark.long
+
 PAGE = Path(__file__).parents[2] / "docs" / "messy_tables.md"
 JUDGED = ["gap", "height_1", "mass_1", "demand", "probability", "state"]
 HEAD = 'name = "x"\noutput = "out"\nworkers = 1\n[records]\nfolder = "records"\n'

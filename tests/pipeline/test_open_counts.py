@@ -15,7 +15,11 @@ from per_obspy.pipeline.run import report, run, screen
 from .open_counts import OpenCounts
 from .small_run import SPECTRA, InProcess, write_configuration
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="counts with inotify")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(sys.platform != "linux", reason="counts with inotify"),
+    pytest.mark.usefixtures("plain_figures"),
+]
 
 CONFIGURATION = """\
 name = "counted"
@@ -36,21 +40,17 @@ def simulated(tmp_path_factory):
     run(write_configuration(folder), executor=InProcess())
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     (folder / "records" / "event.xml").rename(folder / "event.xml")
+    write_counted(folder, "false")
+    run(folder / "counted.toml", executor=InProcess())
     return folder
 
 
 @pytest.fixture
 def folder(simulated, tmp_path):
+    """The finished run, done by another process."""
     shutil.copytree(simulated, tmp_path, dirs_exist_ok=True)
-    write_counted(tmp_path, "false")
-    return tmp_path
-
-
-def finished(folder, opens):
-    """Do the run, as another process would, and forget its counts."""
-    run(folder / "counted.toml", executor=InProcess())
     read_station_once.cache_clear()
-    opens()
+    return tmp_path
 
 
 def write_counted(folder, layers):
@@ -61,7 +61,6 @@ def write_counted(folder, layers):
 def opens(folder):
     """Count the opens in all folders of the run."""
     stations = folder / "counted" / "stations"
-    stations.mkdir(parents=True)
     counts = OpenCounts(folder, folder / "records", stations.parent, stations)
     yield counts
     counts.close()
@@ -87,8 +86,11 @@ def by_kind(counts, folder):
 
 
 @pytest.mark.parametrize("layers", ["false", "true"])
-def test_a_run_opens_each_record_and_shard_at_most_twice(folder, opens, layers):
+def test_a_run_opens_each_record_and_shard_at_most_twice(folder, request, layers):
     write_counted(folder, layers)
+    shutil.rmtree(folder / "counted")
+    (folder / "counted" / "stations").mkdir(parents=True)
+    opens = request.getfixturevalue("opens")
     assert run(folder / "counted.toml", executor=InProcess()).record["counts"]["pairs"]
     # records: headers and hash together, then the samples; event, metadata: once for all stations;
     # station files: hash with spectra, then the motion; risk table: rows of buildings (one opening
@@ -104,14 +106,12 @@ def test_a_run_opens_each_record_and_shard_at_most_twice(folder, opens, layers):
 
 
 def test_the_same_again_opens_each_file_once(folder, opens):
-    finished(folder, opens)
     assert run(folder / "counted.toml", executor=InProcess()).did_nothing
     # inputs, stations and results are compared with their hashes
     assert set(by_kind(opens(), folder).values()) == {1}
 
 
 def test_a_resumed_run_opens_no_record_for_its_samples(folder, opens):
-    finished(folder, opens)
     (folder / "counted" / "run.json").unlink()
     counts = run(folder / "counted.toml", executor=InProcess()).record["counts"]
     assert counts["stations_resumed"] == 3
@@ -122,7 +122,6 @@ def test_a_resumed_run_opens_no_record_for_its_samples(folder, opens):
 
 
 def test_stages_of_their_own_open_each_file_at_most_twice(folder, opens):
-    finished(folder, opens)
     screen(folder / "counted.toml", executor=InProcess())
     counts = by_kind(opens(), folder)
     # rows of buildings, the report, and the hash, as in a whole run

@@ -16,7 +16,7 @@ from .small_run import InProcess, write_smallest_configuration
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
-pytestmark = pytest.mark.usefixtures("plain_reports")
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("plain_reports")]
 
 #: Results that must have the same bytes wherever the work is done.
 COMPARED = ("risk.csv", "risk.parquet", "rejected.csv", "totals.csv", "stations.csv")

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+pytestmark = pytest.mark.long
+
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 

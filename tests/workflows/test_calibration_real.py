@@ -8,6 +8,8 @@ import pytest
 
 from per_obspy.config import Screening
 
+pytestmark = pytest.mark.long
+
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 #: Two earthquakes of different size, ground and distance between stations.

@@ -11,6 +11,8 @@ from per_obspy.errors import RecordRejected
 from per_obspy.processing.chain import process_station
 from per_obspy.records.metadata import with_metadata
 
+pytestmark = pytest.mark.long
+
 SCRIPT = runpy.run_path(str(Path(__file__).parents[2] / "workflows" / "damaged_records.py"))
 FAULTS = SCRIPT["FAULTS"]
 

@@ -9,6 +9,8 @@ import pytest
 
 from per_obspy import single_hit
 
+pytestmark = pytest.mark.long
+
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 

@@ -16,6 +16,8 @@ from per_obspy.tables.table_files import rounded
 
 from ..pipeline.small_run import InProcess, plain_reports
 
+pytestmark = pytest.mark.long
+
 CHECKOUT = Path(__file__).parents[2]
 WORKFLOWS = CHECKOUT / "workflows"
 
