@@ -1,11 +1,5 @@
-"""
-Work on one chunk of rows of buildings: whole rows of one station, and their exact histories.
+"""Work on one chunk of rows of buildings: whole rows of one station, and their exact histories."""
 
-Chunks are independent of each other and are resumed as those of pairs are: see
-:mod:`per_obspy.jobs.chunk`.
-"""
-
-import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from importlib.metadata import version
@@ -18,10 +12,10 @@ import pyarrow as pa
 from per_obspy.buildings.histories import no_outcomes, row_outcomes
 from per_obspy.buildings.tables import write_rows_part
 from per_obspy.errors import Rejection
-from per_obspy.files import file_hash, remove_file
+from per_obspy.files import remove_file
 from per_obspy.jobs.ground_files import StationFile, read_station_once
-from per_obspy.jobs.parallel import Work, new_and_resumed
-from per_obspy.resume import earlier_status, read_status, write_status
+from per_obspy.jobs.parallel import Work
+from per_obspy.jobs.parts import Part, do_parts, record_part, rows_hash
 from per_obspy.screening.values import Columns, chosen, components
 from per_obspy.spectra.station import lacks_azimuths
 
@@ -51,73 +45,21 @@ class RowsJob(NamedTuple):
     part: Path
     key: str = ""
 
-
-class RowsPart(NamedTuple):
-    """
-    Result of a chunk.
-
-    Attributes
-    ----------
-    number : int
-        Its place.
-    rows : int
-        Number of contacts.
-    path, status : Path
-        Parquet file of the interfaces, and status file with the rejections.
-    resumed, failed : bool
-        Whether an earlier run had done it; whether its work failed unexpectedly.
-    """
-
-    number: int
-    rows: int
-    path: Path
-    status: Path
-    resumed: bool = False
-    failed: bool = False
-
-
-def rows_rejections(parts: Iterable[RowsPart]) -> Iterator[Rejection]:
-    """Yield the rows whose history could not be computed."""
-    for part in parts:
-        yield from map(Rejection.stored, read_status(part.status)["rejected"])
+    @property
+    def rows(self) -> int:
+        """Number of contacts."""
+        return int(self.contacts.num_rows)
 
 
 def do_row_chunks(
     jobs: Iterable[RowsJob], workers: int, executor: Executor | None
-) -> Iterator[RowsPart]:
-    """
-    Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
-
-    Parameters
-    ----------
-    jobs : iterable of RowsJob
-        Chunks, which are taken while the work goes on.
-    workers : int
-        Number of processes.
-    executor : Executor or None
-        Where to work instead.
-
-    Raises
-    ------
-    WriteError
-        If a part cannot be written.
-    Unfinished
-        After all other chunks, if the machine failed at some.
-    """
+) -> Iterator[Part]:
+    """Yield the part of every chunk as it is finished, as :func:`per_obspy.jobs.parts.do_parts`."""
     keyed = (job._replace(key=_key(job)) for job in jobs)
-    work = Work(do_rows, _failed, _name)
-    yield from new_and_resumed(keyed, _earlier, work, workers, executor)
+    yield from do_parts(keyed, Work(do_rows, _failed, _name), workers, executor)
 
 
-def _earlier(job: RowsJob) -> RowsPart | None:
-    """Return the part of an earlier run if its key is the same and the part is complete."""
-    status = earlier_status(_status_file(job), job.key)
-    if status is None or "rejected" not in status:
-        return None
-    return _part(job)._replace(resumed=True)
-
-
-def do_rows(job: RowsJob) -> RowsPart:
+def do_rows(job: RowsJob) -> Part:
     """Follow the rows of a chunk, write its part and status, and return the finished part."""
     remove_file(job.part)
     contacts = _columns(job.contacts)
@@ -186,7 +128,7 @@ def _flagged(flags: np.ndarray, name: str) -> np.ndarray:
 
 def _record(
     job: RowsJob, contacts: Columns, outcomes: Columns, rejected: Sequence[Rejection]
-) -> RowsPart:
+) -> Part:
     """Write a part, its status after it, and return the part."""
     names, flags = contacts["row_id"], contacts["flags"]
     # What holds for one contact of a row holds for all of it
@@ -197,30 +139,13 @@ def _record(
     for name, rows in raised.items():
         flags = np.where(rows, _flagged(flags, name), flags)
     write_rows_part({**contacts, **outcomes, "flags": flags}, job.part)
-    outputs = {job.part.name: file_hash(job.part)}
-    write_status(_status_file(job), job.key, outputs, {"rejected": list(rejected)})
-    return _part(job)
-
-
-def _part(job: RowsJob) -> RowsPart:
-    """Return the part of a chunk."""
-    return RowsPart(job.number, job.contacts.num_rows, job.part, _status_file(job))
-
-
-def _status_file(job: RowsJob) -> Path:
-    """Return the status file of a chunk."""
-    return job.part.with_suffix(".json")
+    return record_part(job, rejected)
 
 
 def _key(job: RowsJob) -> str:
     """Return the hash of all inputs of the part."""
     station = job.station.hash if job.station else ""
-    digest = hashlib.sha256("\n".join([version("per_obspy"), station]).encode())
-    content = pa.BufferOutputStream()
-    with pa.ipc.new_stream(content, job.contacts.schema) as stream:
-        stream.write_table(job.contacts.combine_chunks())
-    digest.update(content.getvalue())
-    return digest.hexdigest()
+    return rows_hash([version("per_obspy"), station], job.contacts)
 
 
 def _name(job: RowsJob) -> str:
@@ -229,12 +154,12 @@ def _name(job: RowsJob) -> str:
     return f"rows of buildings from {rows[0]} to {rows[-1]}"
 
 
-def _failed(job: RowsJob, reason: str) -> RowsPart:
+def _failed(job: RowsJob, reason: str) -> Part:
     """Return a part without histories after a failure; the next run repeats it."""
     return _reject_all(job._replace(key=""), reason)._replace(failed=True)
 
 
-def _reject_all(job: RowsJob, reason: str) -> RowsPart:
+def _reject_all(job: RowsJob, reason: str) -> Part:
     """Write a part of which no row has a history, for the same reason."""
     names = dict.fromkeys(job.contacts["row_id"].to_pylist())
     rejected = [Rejection("row", str(name), "", None, (reason,)) for name in names]

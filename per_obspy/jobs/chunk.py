@@ -1,13 +1,6 @@
-"""
-Work on one chunk of the inventory, from raw rows to its part of the risk table.
+"""Work on one chunk of the inventory, from raw rows to its part of the risk table."""
 
-Chunks are independent of each other. A part is a Parquet file with a status file
-(:mod:`per_obspy.resume`) of its name, which also holds the rejections. A chunk whose status and
-part are whole is not done again.
-"""
-
-import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
@@ -18,11 +11,11 @@ import pyarrow as pa
 
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
-from per_obspy.files import file_hash, remove_file
+from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
-from per_obspy.jobs.parallel import Work, new_and_resumed
-from per_obspy.resume import earlier_status, read_status, write_status
+from per_obspy.jobs.parallel import Work
+from per_obspy.jobs.parts import Part, do_parts, record_part, rows_hash
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
@@ -49,7 +42,7 @@ class ChunkJob(NamedTuple):
     part : Path
         Where its rows go.
     key : str
-        Hash of everything on which the part depends; :func:`do_chunks` computes it.
+        Hash of everything on which the part depends; computed by :func:`do_chunks`.
     """
 
     number: int
@@ -60,64 +53,16 @@ class ChunkJob(NamedTuple):
     part: Path
     key: str = ""
 
-
-class Part(NamedTuple):
-    """
-    Result of a chunk.
-
-    Attributes
-    ----------
-    number : int
-        Its place in the inventory.
-    rows : int
-        Number of rows of the inventory that it held.
-    path : Path or None
-        Rows of the risk table, and the keys of their order; None if no pair was left.
-    status : Path
-        Status file with the rejections, see :func:`rejections`.
-    resumed : bool
-        Whether an earlier run had done it.
-    failed : bool
-        Whether its work failed unexpectedly, so that the next run does it again.
-    """
-
-    number: int
-    rows: int
-    path: Path | None
-    status: Path
-    resumed: bool
-    failed: bool = False
-
-
-def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
-    """Yield the rejections of parts, reading one part at a time."""
-    for part in parts:
-        yield from map(Rejection.stored, read_status(part.status)["rejected"])
+    @property
+    def rows(self) -> int:
+        """Number of rows of the inventory."""
+        return len(self.chunk.repeated)
 
 
 def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
-    """
-    Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
-
-    Parameters
-    ----------
-    jobs : iterable of ChunkJob
-        Chunks, which are taken while the work goes on.
-    workers : int
-        Number of processes.
-    executor : Executor or None
-        Where to work instead.
-
-    Raises
-    ------
-    WriteError
-        If a part cannot be written.
-    Unfinished
-        After all other chunks, if the machine failed at some.
-    """
+    """Yield the part of every chunk as it is finished, as :func:`per_obspy.jobs.parts.do_parts`."""
     keyed = (job._replace(key=_key(job)) for job in jobs)
-    work = Work(do_chunk, _failed, _name)
-    yield from new_and_resumed(keyed, _earlier, work, workers, executor)
+    yield from do_parts(keyed, Work(do_chunk, _failed, _name), workers, executor)
 
 
 def do_chunk(job: ChunkJob) -> Part:
@@ -128,28 +73,8 @@ def do_chunk(job: ChunkJob) -> Part:
     # Rows that cannot be computed belong to the file of the chunk
     rejected = [row._replace(source=job.chunk.rows.source) for row in uncomputed]
     if len(rows):
-        ordered = in_order(rows)
-        write_part(ordered, job.number, job.part)
-    has_part = len(rows) > 0
-    return _recorded(job, job.key, has_part, [*pairs.attrs["rejected"], *rejected])
-
-
-def _recorded(job: ChunkJob, key: str, has_part: bool, rejected: Sequence[Rejection]) -> Part:
-    """Write the status of a part, after the part, and return the part."""
-    outputs = {job.part.name: file_hash(job.part)} if has_part else {}
-    write_status(_status_file(job), key, outputs, {"rejected": rejected})
-    return _part(job, has_part, resumed=False)
-
-
-def _part(job: ChunkJob, has_part: bool, resumed: bool) -> Part:
-    """Return the part of a chunk."""
-    path = job.part if has_part else None
-    return Part(job.number, len(job.chunk.repeated), path, _status_file(job), resumed)
-
-
-def _status_file(job: ChunkJob) -> Path:
-    """Return the status file of a chunk."""
-    return job.part.with_suffix(".json")
+        write_part(in_order(rows), job.number, job.part)
+    return record_part(job, [*pairs.attrs["rejected"], *rejected])
 
 
 def _computed_rows(
@@ -174,28 +99,13 @@ def _computed_rows(
 
 def _key(job: ChunkJob) -> str:
     """Return the hash of all inputs of the part."""
-    rows, digest = job.chunk.rows, hashlib.sha256()
+    rows = job.chunk.rows
     # Program, settings and ground motion
     settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
-    parts = [version("per_obspy"), rows.source, *settings, job.ground.key]
-    digest.update("\n".join(parts).encode())
-    # Raw rows: broken lines, cells, places in their file, what came before, and what is odd
-    digest.update(repr(rows.broken).encode())
-    content = pa.BufferOutputStream()
-    with pa.ipc.new_stream(content, rows.table.schema) as stream:
-        stream.write_table(rows.table.combine_chunks())
-    digest.update(content.getvalue())
-    digest.update(rows.lines.tobytes() + job.chunk.repeated.tobytes())
-    digest.update("\n".join(job.chunk.odd).encode())
-    return digest.hexdigest()
-
-
-def _earlier(job: ChunkJob) -> Part | None:
-    """Return the part of an earlier run if its key is the same and the part is complete."""
-    status = earlier_status(_status_file(job), job.key)
-    if status is None or "rejected" not in status:
-        return None
-    return _part(job, bool(status["outputs"]), resumed=True)
+    texts = [version("per_obspy"), rows.source, *settings, job.ground.key, repr(rows.broken)]
+    # Raw rows, their places in the file, what came before, and what is odd
+    places = rows.lines.tobytes() + job.chunk.repeated.tobytes()
+    return rows_hash(texts, rows.table, places, "\n".join(job.chunk.odd).encode())
 
 
 def _name(job: ChunkJob) -> str:
@@ -215,4 +125,5 @@ def _failed(job: ChunkJob, reason: str) -> Part:
         Rejection("pair", name or "", rows.source, line, (reason,))
         for name, line in zip(names, rows.lines.tolist(), strict=True)
     ]
-    return _recorded(job, "", False, [*rows.broken, *rejected])._replace(failed=True)
+    remove_file(job.part)
+    return record_part(job, [*rows.broken, *rejected], key="")._replace(failed=True)

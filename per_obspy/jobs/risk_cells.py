@@ -17,8 +17,8 @@ from typing import NamedTuple, NoReturn
 import pyarrow as pa
 
 from per_obspy.files import content_hash, file_hash, remove_file, temporary_folder, writing
-from per_obspy.jobs.chunk import Part
 from per_obspy.jobs.parallel import Work, new_and_resumed
+from per_obspy.jobs.parts import Part
 from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.tables.parts import joined_schema

@@ -12,9 +12,10 @@ from per_obspy.buildings.search import IDENTIFIERS, AllRows, chunks_of, find_row
 from per_obspy.buildings.tables import write_buildings, write_rows
 from per_obspy.config import Run
 from per_obspy.errors import Rejection
-from per_obspy.files import remove_file, temporary_folder
-from per_obspy.jobs.building_rows import RowsJob, RowsPart, do_row_chunks, rows_rejections
+from per_obspy.files import temporary_folder
+from per_obspy.jobs.building_rows import RowsJob, do_row_chunks
 from per_obspy.jobs.ground_files import GroundFiles
+from per_obspy.jobs.parts import Part, rejections, remove_other_parts
 from per_obspy.progress import Progress
 from per_obspy.tables.ranked_table import ranked_table, table_files
 from per_obspy.threads import usable_processors
@@ -84,15 +85,15 @@ def building_rows(
         jobs = _jobs(settings, folder, ground, found)
         parts = _parts(jobs, settings.workers, executor, progress, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
-        _remove_others(folder / "rows", parts)
-        outputs = write_rows([part.path for part in parts], folder, facts)
+        remove_other_parts(folder / "rows", parts)
+        outputs = write_rows([part.path for part in parts if part.path], folder, facts)
         outputs += write_buildings(folder, found.file, settings, facts)
-    rejected = (*found.rejected, *rows_rejections(parts))
+    rejected = (*found.rejected, *rejections(parts))
     failed = any(part.failed for part in parts)
     return BuildingRowsDone(outputs, _counts(found, folder, parts), rejected, failed, found.served)
 
 
-def _counts(found: AllRows, folder: Path, parts: Sequence[RowsPart]) -> dict[str, int]:
+def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
     """Return the numbers of rows, buildings and chunks."""
     buildings = pq.read_metadata((folder / "buildings.parquet").absolute())
     return {
@@ -119,20 +120,12 @@ def _parts(
     executor: Executor | None,
     progress: Progress,
     contacts: int,
-) -> list[RowsPart]:
+) -> list[Part]:
     """Compute the chunks of a number of contacts, and return the parts in order."""
     progress("rows", 0, contacts)
-    parts, done = list[RowsPart](), 0
+    parts, done = list[Part](), 0
     for part in do_row_chunks(jobs, workers or usable_processors(), executor):
         parts.append(part)
         done += part.rows
         progress("rows", done, contacts)
     return sorted(parts, key=lambda part: part.number)
-
-
-def _remove_others(folder: Path, parts: list[RowsPart]) -> None:
-    """Remove parts of an earlier table, and partly written ones."""
-    known = {path for part in parts for path in (part.path, part.status)}
-    for path in folder.iterdir() if folder.is_dir() else ():
-        if path not in known and path.is_file():
-            remove_file(path)

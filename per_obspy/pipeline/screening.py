@@ -13,11 +13,11 @@ import pyarrow.parquet as pq
 
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import remove_file
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
-from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
+from per_obspy.jobs.chunk import CHUNK, ChunkJob, do_chunks
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
+from per_obspy.jobs.parts import Part, rejections, remove_other_parts
 from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
@@ -219,7 +219,7 @@ def _parts(
         lost, block = list(rejections([part])), raw.pop(part.number)
         tally.add(lost, areas_left_out(settings.totals, lost, block))
         progress("screening", min(rows, inventory.count), inventory.count)
-    _remove_others(_chunk_folder(folder), parts)
+    remove_other_parts(_chunk_folder(folder), parts)
     # Findings about the tables, after all their rows were read
     return sorted(parts, key=lambda part: part.number), _notes(inventory), tally
 
@@ -242,15 +242,6 @@ def _inventory(settings: Run, folder: Path, ground: GroundFiles) -> PairInventor
     if area and area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {area!r}")
     return inventory
-
-
-def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
-    """Remove parts of a longer inventory, and partly written ones."""
-    known = {part.status for part in parts}
-    known |= {part.path for part in parts if part.path}
-    for path in folder.iterdir() if folder.is_dir() else ():
-        if path not in known and path.is_file():
-            remove_file(path)
 
 
 def _chunk_rows(count: int, workers: int) -> int:

@@ -9,7 +9,8 @@ import pytest
 
 from per_obspy.buildings.columns import ROWS
 from per_obspy.jobs import building_rows
-from per_obspy.jobs.building_rows import RowsJob, do_row_chunks, rows_rejections
+from per_obspy.jobs.building_rows import RowsJob, do_row_chunks
+from per_obspy.jobs.parts import rejections
 
 
 def contacts(**changes):
@@ -38,7 +39,7 @@ def test_without_a_record_there_is_no_history(jobs):
     table = pd.read_parquet(part.path)
     assert table["impacts"].isna().all()
     assert table["flags"].tolist() == ["", "", "fork"]
-    assert list(rows_rejections([part])) == []
+    assert list(rejections([part])) == []
 
 
 def test_the_same_chunk_is_not_done_again(jobs):
@@ -57,7 +58,7 @@ def test_a_chunk_that_fails_has_a_reason_for_every_row_and_is_done_again(jobs, m
     monkeypatch.setattr(building_rows, "no_outcomes", failing)
     (part,) = done(jobs())
     assert part.failed
-    assert {rejection.name for rejection in rows_rejections([part])} == {"R-a", "R-c"}
+    assert {rejection.name for rejection in rejections([part])} == {"R-a", "R-c"}
     assert pd.read_parquet(part.path)["flags"].tolist() == [
         "no_history",
         "no_history",

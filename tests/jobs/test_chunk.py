@@ -9,8 +9,9 @@ from per_obspy.config import Building, Interpolation, Screening
 from per_obspy.errors import Unfinished
 from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs import chunk
-from per_obspy.jobs.chunk import ChunkJob, do_chunks, rejections
+from per_obspy.jobs.chunk import ChunkJob, do_chunks
 from per_obspy.jobs.ground_files import ground_files
+from per_obspy.jobs.parts import rejections
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
 ROWS = [f"p{number},0.3,0.1,10,0.3001,0.1,12,0.05\n" for number in range(7)]

@@ -16,7 +16,7 @@ import pytest
 
 from per_obspy.errors import PerError
 from per_obspy.files import file_hash
-from per_obspy.jobs.chunk import Part
+from per_obspy.jobs.parts import Part
 from per_obspy.jobs.risk_cells import Means, write_cells, write_texts
 from per_obspy.progress import silent
 from per_obspy.resume import write_status
