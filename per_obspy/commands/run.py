@@ -211,7 +211,7 @@ def spectra(
     """
     from per_obspy.config import Processing, Spectra, checked
     from per_obspy.jobs.executor import dask_executor
-    from per_obspy.pipeline.spectra import plot_station, spectra_of
+    from per_obspy.pipeline.process import plot_station, spectra_of
 
     # The grid, checked as in a configuration
     given: dict[str, object] = {"shortest": shortest, "longest": longest, "count": count}

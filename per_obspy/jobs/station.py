@@ -21,17 +21,11 @@ import xarray as xr
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError, PerError, Rejection, TryLater, WrongOutput
 from per_obspy.files import bytes_hash, file_hash, remove_file
-from per_obspy.jobs.event_facts import (
-    hypocentre_attributes,
-    is_of_event,
-    moved_shard,
-    source_facts,
-    source_of_job,
-)
 from per_obspy.jobs.parallel import Work, results
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.account import taken
 from per_obspy.processing.chain import process_station
+from per_obspy.processing.earthquake import Source, same_decisions, source_of
 from per_obspy.records.earthquakes.quakeml import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
@@ -42,7 +36,86 @@ from per_obspy.spectra.storage import read_spectra, without_motion, write_spectr
 if TYPE_CHECKING:
     from obspy import Inventory, Stream
 
-    from per_obspy.processing.earthquake import Source
+
+def hypocentre_attributes(file: EventFile | None) -> dict[str, float]:
+    """Return the hypocentre as attributes of a station file, degrees and m; empty if unknown."""
+    if file is None:
+        return {}
+    origin = file.event.preferred_origin() or next(iter(file.event.origins), None)
+    if not origin or None in (origin.longitude, origin.latitude, origin.depth):
+        return {}
+    return {
+        f"hypocentre_{name}": float(origin[name]) for name in ("longitude", "latitude", "depth")
+    }
+
+
+def source_of_job(event: EventFile | None, decisions: list[dict[str, Any]]) -> Source | None:
+    """Return the earthquake for the processing, which collects its decisions; None without one."""
+    if event is None or not event.event.origins:
+        return None
+    return source_of(event.event, decisions)
+
+
+def source_facts(event: EventFile | None) -> dict[str, object] | None:
+    """Return everything of an earthquake that can change a station, as plain values."""
+    if event is None:
+        return None
+    source = source_of(event.event)
+    return {
+        "time": source.time.ns,
+        "place": [source.latitude, source.longitude, source.depth],
+        "magnitude": source.magnitude,
+        "hypocentre": hypocentre_attributes(event),
+    }
+
+
+def is_of_event(status: Mapping[str, Any], event: EventFile, processing: Processing) -> bool:
+    """
+    Return whether the motion of a station is that which an earthquake gives.
+
+    Parameters
+    ----------
+    status : mapping
+        Content of the station's status file.
+    event : EventFile
+        The earthquake now.
+    processing : Processing
+        Settings of the station.
+    """
+    decisions = status.get("decisions")
+    if not isinstance(decisions, list) or not isinstance(status.get("source"), dict):
+        return False
+    return same_decisions(decisions, source_of(event.event), processing)
+
+
+def moved_shard(shard: Path, before: Mapping[str, Any], event: EventFile) -> bool:
+    """
+    Write the hypocentre of an earthquake into a station file unless it is there.
+
+    Parameters
+    ----------
+    shard : Path
+        Whole station file.
+    before : mapping
+        From :func:`source_facts`, of the earthquake for which it was written.
+    event : EventFile
+        The earthquake now.
+
+    Returns
+    -------
+    is_possible : bool
+        False if one of both hypocentres is unknown: that of the headers is in its place.
+    """
+    known, new = before.get("hypocentre"), hypocentre_attributes(event)
+    if known == new:
+        return True
+    if not known or not new:
+        return False
+    dataset = read_spectra(shard, shard.read_bytes()).drop_encoding()
+    dataset.attrs |= new
+    write_spectra(dataset, shard)
+    return True
+
 
 #: Suffix of a station file with spectra.
 SPECTRA = ".nc"

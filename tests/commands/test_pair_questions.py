@@ -4,7 +4,7 @@ import pytest
 from messy_tables import NAMES, ROWS, readable, text_of
 
 from per_obspy import read_pairs
-from per_obspy.commands import pair_questions
+from per_obspy.commands import pairs
 
 DISTANCE = ["distance" if name == "gap" else name for name in NAMES]
 
@@ -15,7 +15,7 @@ def answering(monkeypatch):
 
     def answering(*answers):
         given = iter(answers)
-        monkeypatch.setattr(pair_questions, "is_terminal", lambda: True)
+        monkeypatch.setattr(pairs, "is_terminal", lambda: True)
         monkeypatch.setattr("builtins.input", lambda _: next(given))
         return given
 

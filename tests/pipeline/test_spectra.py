@@ -9,7 +9,7 @@ from obspy import Stream, Trace
 import per_obspy
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.errors import CatalogError
-from per_obspy.pipeline.spectra import plot_station, spectra_of
+from per_obspy.pipeline.process import plot_station, spectra_of
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.progress import silent
 from per_obspy.records.processed_files import write_description, write_processed
@@ -78,8 +78,8 @@ def test_a_station_is_drawn(records, tmp_path):
 
 def test_figures_of_a_station_without_network_are_no_hidden_files(tmp_path, monkeypatch):
     # would catch: the dot before the station as the start of a file's name
-    monkeypatch.setattr("per_obspy.pipeline.spectra.draw_spectra", lambda *_: None)
-    monkeypatch.setattr("per_obspy.pipeline.spectra.draw_state_space", lambda *_: None)
+    monkeypatch.setattr("per_obspy.pipeline.process.draw_spectra", lambda *_: None)
+    monkeypatch.setattr("per_obspy.pipeline.process.draw_state_space", lambda *_: None)
     motion = np.random.default_rng(3).normal(size=2000)
     trace = Trace(motion, {"station": "ELC", "channel": "HNN", "delta": 0.01, "units": "m/s2"})
     write_spectra(per_obspy.station_spectra(trace), tmp_path / "ELC.nc")

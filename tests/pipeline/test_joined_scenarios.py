@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from pyarrow import parquet
 
-from per_obspy.tables import ensemble
-from per_obspy.tables.ensemble import Scenarios, write_ensemble
+from per_obspy.pipeline import ensemble
+from per_obspy.pipeline.ensemble import Scenarios, write_ensemble
 
 COUNT = 500
 
