@@ -233,13 +233,13 @@ INTERRUPTED = """
 import sys
 import time
 from per_obspy import cli
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Workers, Work, results
 notes = f"open({sys.argv[2]!r} + str(__import__('os').getpid()), 'w').close()"
 task = f"{notes} or __import__('time').sleep(100)"
 
 @cli.app.command()
 def sleep(folder: str) -> None:
-    list(results([task, task], eval_work(), 2, None))
+    list(results([task, task], eval_work(), Workers(2)))
 
 def eval_work():
     return Work(eval, lambda *_: None)

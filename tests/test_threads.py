@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from per_obspy import threads
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, Workers, results
 from per_obspy.threads import map_in_threads, usable_processors, use_one_thread
 
 
@@ -143,5 +143,5 @@ COUNT_THREADS = (
 
 def test_a_worker_process_uses_one_thread():
     # would catch n processes of n threads on n processors
-    found = list(results([COUNT_THREADS] * 2, Work(eval, lambda _, reason: reason), 2, None))
+    found = list(results([COUNT_THREADS] * 2, Work(eval, lambda _, reason: reason), Workers(2)))
     assert found == [0, 0]

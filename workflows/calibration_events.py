@@ -13,8 +13,8 @@ from obspy import Stream
 from per_obspy import process, station_spectra
 from per_obspy.config import Processing, Records, Spectra
 from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.stations import finished_stations, station_jobs
-from per_obspy.progress import silent
 from per_obspy.records.sources import find_sources
 from per_obspy.records.text_table import read_columns
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE, Hypocentre, hypocentre_of
@@ -97,7 +97,7 @@ def _stations(folder: Path, cache: Path) -> dict[str, xr.Dataset]:
         return {}
     shards = cache / folder.name
     jobs = station_jobs(found.stations, shards, Processing(), Spectra(), found.event)
-    done = finished_stations(jobs, 1, None, silent)
+    done = finished_stations(jobs, Workers(1))
     return {
         station.station: read_spectra(station.shard, station.shard.read_bytes())
         for station in done

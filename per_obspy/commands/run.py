@@ -31,7 +31,6 @@ from per_obspy.commands.printing import (
     stop_if_nothing,
 )
 from per_obspy.errors import printable
-from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -211,6 +210,7 @@ def spectra(
     """
     from per_obspy.config import Processing, Spectra, checked
     from per_obspy.jobs.executor import dask_executor
+    from per_obspy.jobs.parallel import Workers
     from per_obspy.pipeline.process import plot_station, spectra_of
 
     # The grid, checked as in a configuration
@@ -221,8 +221,8 @@ def spectra(
 
     # Spectra of all stations, and figures of each on request
     with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
-        where = (usable_processors(), executor, progress)
-        done, rejected = spectra_of(sources, output, Processing(), grid, where)
+        workers = Workers(0, executor, progress)
+        done, rejected = spectra_of(sources, output, Processing(), grid, workers)
     shards = [station.shard for station in done if station.shard]
     files = [str(output)] if shards else []
     for shard in shards if plot else []:
@@ -273,13 +273,14 @@ def process(
     """
     from per_obspy.config import Processing, load
     from per_obspy.jobs.executor import dask_executor
+    from per_obspy.jobs.parallel import Workers
     from per_obspy.pipeline.process import process_records
 
     # Process every station
     chosen = load(settings, Processing) if settings else Processing()
     with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
-        where = (usable_processors(), executor, progress)
-        result = process_records(sources, output, chosen, event, report, where)
+        workers = Workers(0, executor, progress)
+        result = process_records(sources, output, chosen, event, report, workers)
 
     # Print counts and files, for machines or people
     stations = sum(station.shard is not None for station in result.done)

@@ -1,7 +1,6 @@
 """Work on one chunk of rows of buildings: whole rows of one station, and their exact histories."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from per_obspy.buildings.tables import write_rows_part
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.jobs.ground_files import StationFile, read_station_once
-from per_obspy.jobs.parallel import Work
+from per_obspy.jobs.parallel import Work, Workers
 from per_obspy.jobs.parts import Part, do_parts, record_part, rows_hash
 from per_obspy.screening.values import Columns, chosen, components
 from per_obspy.spectra.station import lacks_azimuths
@@ -51,12 +50,10 @@ class RowsJob(NamedTuple):
         return int(self.contacts.num_rows)
 
 
-def do_row_chunks(
-    jobs: Iterable[RowsJob], workers: int, executor: Executor | None
-) -> Iterator[Part]:
+def do_row_chunks(jobs: Iterable[RowsJob], workers: Workers) -> Iterator[Part]:
     """Yield the part of every chunk as it is finished, as :func:`per_obspy.jobs.parts.do_parts`."""
     keyed = (job._replace(key=_key(job)) for job in jobs)
-    yield from do_parts(keyed, Work(do_rows, _failed, _name), workers, executor)
+    yield from do_parts(keyed, Work(do_rows, _failed, _name), workers)
 
 
 def do_rows(job: RowsJob) -> Part:

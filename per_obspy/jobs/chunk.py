@@ -1,7 +1,6 @@
 """Work on one chunk of the inventory, from raw rows to its part of the risk table."""
 
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
-from per_obspy.jobs.parallel import Work
+from per_obspy.jobs.parallel import Work, Workers
 from per_obspy.jobs.parts import Part, do_parts, record_part, rows_hash
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
@@ -59,10 +58,10 @@ class ChunkJob(NamedTuple):
         return len(self.chunk.repeated)
 
 
-def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
+def do_chunks(jobs: Iterable[ChunkJob], workers: Workers) -> Iterator[Part]:
     """Yield the part of every chunk as it is finished, as :func:`per_obspy.jobs.parts.do_parts`."""
     keyed = (job._replace(key=_key(job)) for job in jobs)
-    yield from do_parts(keyed, Work(do_chunk, _failed, _name), workers, executor)
+    yield from do_parts(keyed, Work(do_chunk, _failed, _name), workers)
 
 
 def do_chunk(job: ChunkJob) -> Part:

@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from per_obspy.config import Run
 from per_obspy.config.engine import Engine, checked_address
 from per_obspy.errors import CatalogError, require_extra
+from per_obspy.jobs.parallel import Workers
 from per_obspy.resume import StatusError, read_status, write_status
 
 
@@ -79,18 +81,16 @@ def _address(address: str) -> str:
 
 
 @contextmanager
-def opened_executor(
-    engine: Engine, given: Executor | None, folder: Path
-) -> Iterator[Executor | None]:
+def opened_executor(engine: Engine, workers: Workers, folder: Path) -> Iterator[Workers]:
     """
-    Yield the executor of a run while its folder is shared with the workers.
+    Yield the workers of a run while its folder is shared with them.
 
     Parameters
     ----------
     engine : Engine
-        Settings; its cluster is used if no executor is given.
-    given : Executor or None
-        Where to work instead.
+        Settings; its cluster is used if the workers have no executor.
+    workers : Workers
+        Where to work.
     folder : Path
         Of the results.
 
@@ -101,16 +101,19 @@ def opened_executor(
     TryLater
         If the cluster has no scheduler or no usable worker.
     """
-    if given is None and engine.dask is not None:
-        with dask_executor(engine.dask) as found, opened_executor(engine, found, folder):
-            yield found
+    if workers.executor is None and engine.dask is not None:
+        with (
+            dask_executor(engine.dask) as cluster,
+            opened_executor(engine, replace(workers, executor=cluster), folder) as used,
+        ):
+            yield used
         return
-    sharing = getattr(given, "sharing", None)
+    sharing = getattr(workers.executor, "sharing", None)
     if sharing is None:
-        yield given
+        yield workers
         return
     with sharing(folder.resolve(), engine):
-        yield given
+        yield workers
 
 
 def engine_facts(executor: Executor | None) -> dict[str, Any]:

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 
 from per_obspy.errors import Unfinished, WriteError
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, Workers, results
 from per_obspy.kernels._jit import can_be_stored
 from per_obspy.progress import Progress
 from per_obspy.screening.warmup import PARTS, compile_part
-from per_obspy.threads import usable_processors
 
 #: Stage of the progress.
 COMPILING = "compiling kernels (once, one to two minutes)"
@@ -46,8 +45,8 @@ def _compiled() -> Iterator[str]:
     """Yield the names of the parts as they are compiled."""
     work = Work(compile_part, _failed)
     first = [name for name in PARTS if name not in LAST]
-    yield from results(first, work, usable_processors(), None)
-    yield from results(LAST, work, usable_processors(), None)
+    yield from results(first, work, Workers())
+    yield from results(LAST, work, Workers())
 
 
 def _failed(name: str, reason: str) -> str:

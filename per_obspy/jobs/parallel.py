@@ -24,6 +24,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
 from multiprocessing import active_children, parent_process
@@ -33,8 +34,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError, WrongOutput
 from per_obspy.jobs.worker_start import start_server, worker_context
 from per_obspy.machine import machine_fault, machine_faults
+from per_obspy.progress import Progress, silent
 from per_obspy.termination import held
-from per_obspy.threads import use_one_thread
+from per_obspy.threads import usable_processors, use_one_thread
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -63,6 +65,31 @@ class Work(NamedTuple, Generic[Task, Result]):
     do: Do[Task, Result]
     failed: Failed[Task, Result]
     name: Callable[[Task], str] = str
+
+
+@dataclass(frozen=True)
+class Workers:
+    """
+    Processes in which tasks are done, and who is told of finished ones.
+
+    Attributes
+    ----------
+    processes : int
+        Number of processes; one, or a single task, needs none but this. 0: one per processor.
+    executor : Executor or None
+        Where to work instead.
+    progress : callable
+        Called with the name of a stage, and the numbers of finished and of all its tasks.
+    """
+
+    processes: int = 0
+    executor: Executor | None = None
+    progress: Progress = silent
+
+    @property
+    def count(self) -> int:
+        """Number of processes."""
+        return self.processes or usable_processors()
 
 
 #: Reason of a task that takes its worker with it, also when it is alone.
@@ -94,12 +121,7 @@ class ElasticExecutor(Executor):
         raise NotImplementedError
 
 
-def results(
-    tasks: Iterable[Task],
-    work: Work[Task, Result],
-    workers: int,
-    executor: Executor | None,
-) -> Iterator[Result]:
+def results(tasks: Iterable[Task], work: Work[Task, Result], workers: Workers) -> Iterator[Result]:
     """
     Yield the result of every task as it is finished.
 
@@ -109,10 +131,8 @@ def results(
         Tasks, which are taken while the work goes on.
     work : Work
         Function of every task.
-    workers : int
-        Number of processes; one, or a single task, needs none but this.
-    executor : Executor, optional
-        Where to work instead.
+    workers : Workers
+        Where to work.
 
     Raises
     ------
@@ -122,7 +142,7 @@ def results(
         After all other tasks, if the machine failed in some.
     """
     faults = list[str]()
-    yield from _all_results(tasks, _Watched(work, faults), workers, executor)
+    yield from _all_results(tasks, _Watched(work, faults), workers)
     if faults:
         raise Unfinished(*faults)
 
@@ -130,10 +150,10 @@ def results(
 def _all_results(
     tasks: Iterable[Task],
     watched: "_Watched[Task, Result]",
-    workers: int,
-    executor: Executor | None,
+    workers: Workers,
 ) -> Iterator[Result]:
     """Yield the results of all tasks in which the machine does not fail."""
+    executor, count = workers.executor, workers.count
     if executor is not None:
         ahead = executor.ahead if isinstance(executor, ElasticExecutor) else _ahead_elsewhere
         for task in (yield from _on(executor, tasks, watched, ahead)):
@@ -141,15 +161,15 @@ def _all_results(
         return
     remaining = iter(tasks)
     first = list(islice(remaining, 2))
-    if min(workers, len(first)) <= 1:
+    if min(count, len(first)) <= 1:
         for task in chain(first, remaining):
             yield from watched.result(task, partial(watched.work.do, task))
         return
     remaining = chain(first, remaining)
     for head in remaining:  # a pool, and another one after each worker that died
-        with _Pool(workers) as pool:
+        with _Pool(count) as pool:
             waiting = chain([head], remaining)
-            unfinished = yield from _on(pool, waiting, watched, lambda: AHEAD * workers)
+            unfinished = yield from _on(pool, waiting, watched, lambda: AHEAD * count)
         for task in unfinished:
             yield from _alone(task, watched)
 
@@ -165,8 +185,7 @@ def new_and_resumed(
     tasks: Iterable[Task],
     earlier: Callable[[Task], Result | None],
     work: Work[Task, Result],
-    workers: int,
-    executor: Executor | None,
+    workers: Workers,
 ) -> Iterator[Result]:
     """
     Yield the result of every task; results of an earlier run are reused.
@@ -177,7 +196,7 @@ def new_and_resumed(
         Taken while the work goes on.
     earlier : callable
         Returns the result that an earlier run left of a task, None if there is none.
-    work, workers, executor
+    work, workers
         As of :func:`results`, whose errors are raised.
     """
     resumed = list[Result]()
@@ -192,7 +211,7 @@ def new_and_resumed(
                 resumed.append(found)
 
     # Resumed results are passed on as soon as the next one is finished
-    for result in results(missing(), work, workers, executor):
+    for result in results(missing(), work, workers):
         yield from resumed
         resumed.clear()
         yield result

@@ -7,7 +7,6 @@ the rejections. A task whose status and part are whole is not done again.
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -15,7 +14,7 @@ import pyarrow as pa
 
 from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
-from per_obspy.jobs.parallel import Work, new_and_resumed
+from per_obspy.jobs.parallel import Work, Workers, new_and_resumed
 from per_obspy.resume import earlier_status, read_status, write_status
 
 
@@ -70,9 +69,7 @@ class Part(NamedTuple):
     failed: bool = False
 
 
-def do_parts(
-    jobs: Iterable[Job], work: Work[Job, Part], workers: int, executor: Executor | None
-) -> Iterator[Part]:
+def do_parts(jobs: Iterable[Job], work: Work[Job, Part], workers: Workers) -> Iterator[Part]:
     """
     Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
 
@@ -82,10 +79,8 @@ def do_parts(
         Tasks with their keys, which are taken while the work goes on.
     work : Work
         What a task does.
-    workers : int
-        Number of processes.
-    executor : Executor or None
-        Where to work instead.
+    workers : Workers
+        Where to work.
 
     Raises
     ------
@@ -94,7 +89,7 @@ def do_parts(
     Unfinished
         After all other tasks, if the machine failed at some.
     """
-    yield from new_and_resumed(jobs, _earlier_part, work, workers, executor)
+    yield from new_and_resumed(jobs, _earlier_part, work, workers)
 
 
 def record_part(job: PartJob, rejected: Sequence[Rejection], key: str | None = None) -> Part:

@@ -9,7 +9,6 @@ appears when all cells are finished, by a change of its name.
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -17,9 +16,8 @@ from typing import NamedTuple, NoReturn
 import pyarrow as pa
 
 from per_obspy.files import content_hash, file_hash, remove_file, temporary_folder, writing
-from per_obspy.jobs.parallel import Work, new_and_resumed
+from per_obspy.jobs.parallel import Work, Workers, new_and_resumed
 from per_obspy.jobs.parts import Part
-from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.tables.parts import joined_schema
 from per_obspy.tables.ranked_cells import (
@@ -89,27 +87,8 @@ class CellJob(NamedTuple):
     key: str
 
 
-class Means(NamedTuple):
-    """
-    Place of the work, and the callback for its progress.
-
-    Attributes
-    ----------
-    workers : int
-        Number of processes.
-    executor : Executor or None
-        Where to work instead.
-    progress : callable
-        Called for every part and every cell.
-    """
-
-    workers: int
-    executor: Executor | None
-    progress: Progress
-
-
 def write_cells(
-    parts: Sequence[Part], folder: Path, facts: Mapping[str, str], size: float, means: Means
+    parts: Sequence[Part], folder: Path, facts: Mapping[str, str], size: float, workers: Workers
 ) -> RiskFiles:
     """
     Write ``risk/`` with one Parquet file per cell.
@@ -124,7 +103,7 @@ def write_cells(
         Facts of the whole table that every file states.
     size : float
         Width and height of a cell, degrees.
-    means : Means
+    workers : Workers
         Where to work.
 
     Raises
@@ -139,7 +118,7 @@ def write_cells(
     schema = joined_schema(paths)
     known = {"facts": dict(facts), "size": size, "parts": _hashes(parts), "form": FORM}
     key = content_hash(known)
-    cells = _arranged(paths, work, schema, (key, size), means)
+    cells = _arranged(paths, work, schema, (key, size), workers)
     whole = ranked_schema(schema, facts)
     made = _made(work / DATASET)
     jobs = [
@@ -147,19 +126,19 @@ def write_cells(
         for cell, rows in sorted(cells.items())
     ]
     # All cells, then the folder under its name
-    counts = _written(jobs, means)
+    counts = _written(jobs, workers)
     _publish(work, {job.file for job in jobs}, folder / DATASET)
     return RiskFiles(table_files(folder), *counts)
 
 
-def _written(jobs: Sequence[CellJob], means: Means) -> CellCounts:
+def _written(jobs: Sequence[CellJob], workers: Workers) -> CellCounts:
     """Write all cells and return their numbers together."""
     total = CellCounts(Counter(), Counter())
-    found = new_and_resumed(jobs, _earlier_cell, _WRITTEN, *means[:2])
+    found = new_and_resumed(jobs, _earlier_cell, _WRITTEN, workers)
     for done, counts in enumerate(found, start=1):
         total.states.update(counts.states)
         total.stations.update(counts.stations)
-        means.progress("cells", done, len(jobs))
+        workers.progress("cells", done, len(jobs))
     return total
 
 
@@ -183,7 +162,7 @@ def _arranged(
     work: Path,
     schema: pa.Schema,
     cells: tuple[str, float],
-    means: Means,
+    workers: Workers,
 ) -> dict[str, list[CellRows]]:
     """Arrange all parts, and return the rows of each cell in the order of the parts."""
     key, size = cells
@@ -194,9 +173,9 @@ def _arranged(
             ArrangeJob(part, ranks, schema, size, work / "arranged" / f"{part.stem}.arrow", key)
             for part, ranks in zip(parts, write_ranks(parts, room), strict=True)
         ]
-        for rows in new_and_resumed(jobs, _earlier_part, _ARRANGED, *means[:2]):
+        for rows in new_and_resumed(jobs, _earlier_part, _ARRANGED, workers):
             found.append(rows)
-            means.progress("ranking", len(found), len(jobs))
+            workers.progress("ranking", len(found), len(jobs))
     joined = dict[str, list[CellRows]]()
     for rows in found:
         for cell, some in rows.items():

@@ -8,7 +8,6 @@ complete is not done again; one that another earthquake leaves as it is gets the
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +20,7 @@ import xarray as xr
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError, PerError, Rejection, TryLater, WrongOutput
 from per_obspy.files import bytes_hash, file_hash, remove_file
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, Workers, results
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.account import taken
 from per_obspy.processing.chain import process_station
@@ -226,9 +225,7 @@ class FinishedStation(NamedTuple):
     failed: bool = False
 
 
-def do_stations(
-    jobs: Sequence[StationJob], workers: int, executor: Executor | None = None
-) -> Iterator[FinishedStation]:
+def do_stations(jobs: Sequence[StationJob], workers: Workers) -> Iterator[FinishedStation]:
     """
     Yield every station as it is finished, in parallel; finished parts of an earlier run are reused.
 
@@ -236,10 +233,8 @@ def do_stations(
     ----------
     jobs : sequence of StationJob
         One job per station.
-    workers : int
-        Number of processes; one, or a single job, needs none but this.
-    executor : Executor, optional
-        Where to work instead, a cluster for example.
+    workers : Workers
+        Where to work.
 
     Raises
     ------
@@ -250,7 +245,7 @@ def do_stations(
     """
     missing = list[StationJob]()
     # A key that cannot be computed costs its own station only
-    for job in results(jobs, Work(_prepared, _failed, _name), 1, None):
+    for job in results(jobs, Work(_prepared, _failed, _name), Workers(1)):
         if isinstance(job, FinishedStation):
             yield job
             continue
@@ -259,7 +254,7 @@ def do_stations(
             missing.append(job)
         else:
             yield earlier
-    yield from results(missing, Work(do_station, _failed, _name), workers, executor)
+    yield from results(missing, Work(do_station, _failed, _name), workers)
 
 
 def _prepared(job: StationJob) -> StationJob | FinishedStation:

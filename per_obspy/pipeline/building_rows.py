@@ -1,7 +1,6 @@
 """Rows of buildings: from the risk table to the tables of rows and of buildings."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -15,10 +14,10 @@ from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.jobs.building_rows import RowsJob, do_row_chunks
 from per_obspy.jobs.ground_files import GroundFiles
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.parts import Part, rejections, remove_other_parts
-from per_obspy.progress import Progress
+from per_obspy.pipeline.provenance import RunContext
 from per_obspy.tables.ranked_table import ranked_table, table_files
-from per_obspy.threads import usable_processors
 
 
 class BuildingRowsDone(NamedTuple):
@@ -51,31 +50,21 @@ NO_ROWS = BuildingRowsDone([], {})
 
 
 def building_rows(
-    settings: Run,
-    folder: Path,
-    ground: GroundFiles,
-    facts: Mapping[str, str],
-    executor: Executor | None,
-    progress: Progress,
+    context: RunContext, ground: GroundFiles, facts: Mapping[str, str]
 ) -> BuildingRowsDone:
     """
     Write the tables of rows and of buildings from the risk table, if rows are enabled.
 
     Parameters
     ----------
-    settings : Run
-        Settings of the run.
-    folder : Path
-        Of the results, with the risk table.
+    context : RunContext
+        The run, whose folder has the risk table.
     ground : GroundFiles
         The stations.
     facts : mapping of str to str
         Facts of the whole table that the Parquet files state.
-    executor : Executor, optional
-        Where to work instead of processes of this machine.
-    progress : callable
-        Called for every chunk.
     """
+    settings, folder = context.settings, context.folder
     with ranked_table(table_files(folder)) as pairs, temporary_folder(folder) as room:
         # By default if pairs name their buildings
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
@@ -83,7 +72,7 @@ def building_rows(
             return NO_ROWS
         found = find_rows(pairs, settings.rows, settings.totals.area, room)
         jobs = _jobs(settings, folder, ground, found)
-        parts = _parts(jobs, settings.workers, executor, progress, found.contacts)
+        parts = _parts(jobs, context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
         outputs = write_rows([part.path for part in parts if part.path], folder, facts)
@@ -114,18 +103,12 @@ def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> I
         yield RowsJob(number, table, station, folder / "rows" / f"{number:06}.parquet")
 
 
-def _parts(
-    jobs: Iterable[RowsJob],
-    workers: int,
-    executor: Executor | None,
-    progress: Progress,
-    contacts: int,
-) -> list[Part]:
+def _parts(jobs: Iterable[RowsJob], workers: Workers, contacts: int) -> list[Part]:
     """Compute the chunks of a number of contacts, and return the parts in order."""
-    progress("rows", 0, contacts)
+    workers.progress("rows", 0, contacts)
     parts, done = list[Part](), 0
-    for part in do_row_chunks(jobs, workers or usable_processors(), executor):
+    for part in do_row_chunks(jobs, workers):
         parts.append(part)
         done += part.rows
-        progress("rows", done, contacts)
+        workers.progress("rows", done, contacts)
     return sorted(parts, key=lambda part: part.number)

@@ -1,7 +1,6 @@
 """Processed records as files: MiniSEED, the table of filter corners, one page per record."""
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -12,13 +11,13 @@ from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_dead_parts, remove_file
 from per_obspy.jobs.executor import opened_executor
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.account import taken
 from per_obspy.processing.chain import before_processing, process_instruments, process_station
 from per_obspy.processing.components import split_structures
 from per_obspy.processing.earthquake import Source
-from per_obspy.progress import Progress
 from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
 from per_obspy.records.sources import find_path_sources
@@ -56,7 +55,7 @@ def process_records(
     settings: Processing,
     event: Path | None,
     report: bool,
-    run: tuple[int, Executor | None, Progress],
+    workers: Workers,
 ) -> Processed:
     """
     Write the processed records of every station in some files and folders.
@@ -75,9 +74,8 @@ def process_records(
         QuakeML file.
     report : bool
         Whether to draw ``stations/NET.STA.pdf`` as well, one page per record.
-    run : (int, Executor or None, callable)
-        Number of processes, where to work instead, and the function that is called for every
-        station.
+    workers : Workers
+        Where to work.
 
     Returns
     -------
@@ -99,9 +97,8 @@ def process_records(
             found.stations, folder / STATIONS, settings, Spectra(), event=earthquake
         )
     ]
-    workers, executor, progress = run
-    with opened_executor(Engine(), executor, folder) as used:
-        done = finished_stations(jobs, workers, used, progress)
+    with opened_executor(Engine(), workers, folder) as used:
+        done = finished_stations(jobs, used)
 
     # Tables of all records
     rejected = all_rejections(found.rejected, done)
@@ -176,7 +173,7 @@ def spectra_of(
     output: Path,
     processing: Processing,
     grid: Spectra,
-    run: tuple[int, Executor | None, Progress],
+    workers: Workers,
 ) -> tuple[list[FinishedStation], tuple[Rejection, ...]]:
     """
     Write the spectra of every station in some files and folders into one netCDF file.
@@ -190,9 +187,8 @@ def spectra_of(
         ones are not computed again. Rejections are written to ``.rejected.csv``.
     processing, grid : Processing, Spectra
         Settings.
-    run : (int, Executor or None, callable)
-        Number of processes, where to work instead, and the function that is called for every
-        station.
+    workers : Workers
+        Where to work.
 
     Returns
     -------
@@ -210,9 +206,8 @@ def spectra_of(
     remove_dead_parts(shards)
     found = find_path_sources(sources)
     jobs = station_jobs(found.stations, shards, processing, grid)
-    workers, executor, progress = run
-    with opened_executor(Engine(), executor, output.absolute().parent) as used:
-        done = finished_stations(jobs, workers, used, progress)
+    with opened_executor(Engine(), workers, output.absolute().parent) as used:
+        done = finished_stations(jobs, used)
     rejected = all_rejections(found.rejected, done)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))
     # The file of the region needs a station with usable records

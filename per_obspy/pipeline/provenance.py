@@ -3,6 +3,8 @@
 import json
 import os
 from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +14,10 @@ from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
 from per_obspy.inventory.files.side_file import side_file
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.inputs.drawn_pairs import layer_files
 from per_obspy.pipeline.inputs.extras import require_extras
+from per_obspy.progress import Progress
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.file_list import input_files
 
@@ -32,6 +36,31 @@ HEADING = (
     "It runs again with the same result: per-obspy run configuration.toml. Keys that start with #",
     "have their defaults. The next run of this folder writes the file again: edit a copy.",
 )
+
+
+@dataclass(frozen=True)
+class RunContext:
+    """
+    Everything that the stages of a run share.
+
+    Attributes
+    ----------
+    settings : Run
+        Settings of the run.
+    folder : Path
+        Of the results.
+    workers : Workers
+        Where to work.
+    """
+
+    settings: Run
+    folder: Path
+    workers: Workers
+
+    @property
+    def progress(self) -> Progress:
+        """Callback for the progress of every stage."""
+        return self.workers.progress
 
 
 class RunSettings:
@@ -62,6 +91,11 @@ class RunSettings:
         require_extras(self.settings)
         self.folder = Path(output or self.settings.output).resolve()
         self.base = self.file.parent if self.file else self.folder
+
+    def context(self, executor: Executor | None, progress: Progress) -> RunContext:
+        """Return what the stages of the run share."""
+        workers = Workers(self.settings.workers, executor, progress)
+        return RunContext(self.settings, self.folder, workers)
 
     def head(self, fetched: "Fetched | None", hashes: Mapping[Path, str]) -> dict[str, Any]:
         """

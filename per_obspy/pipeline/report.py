@@ -13,6 +13,7 @@ import xarray as xr
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.provenance import RunContext
 from per_obspy.pipeline.results.drawings import page_drawings, station_rows
 from per_obspy.pipeline.results.report_files import (
     Report,
@@ -29,7 +30,6 @@ from per_obspy.pipeline.results.report_files import (
 )
 from per_obspy.pipeline.results.run_facts import event_of_run, read_stations, revision_of_run
 from per_obspy.pipeline.stations import simulated_motion
-from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.page.document import write_page
 from per_obspy.report.page.first_screen import revision_line
@@ -47,11 +47,7 @@ from per_obspy.tables.ranked_table import RankedTable, ranked_table, table_files
 
 
 def reported(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    coverage: Coverage,
-    progress: Progress,
+    context: RunContext, stations: Sequence[FinishedStation], coverage: Coverage
 ) -> Report:
     """
     Write the report of the results in the output folder.
@@ -60,18 +56,15 @@ def reported(
 
     Parameters
     ----------
-    settings : Run
-        Settings of the run.
-    folder : Path
-        Of the results; without a risk table only the spectra can be reported.
+    context : RunContext
+        The run; without a risk table in its folder only the spectra can be reported.
     stations : sequence of FinishedStation
         With station files.
     coverage : Coverage
         Rows of the pair tables, and those that are left out.
-    progress : callable
-        Called when it begins and ends.
     """
-    progress("report", 0, 1)
+    settings, folder = context.settings, context.folder
+    context.progress("report", 0, 1)
     report, spectra = Report([], []), None
     usable = [station.spectra for station in stations if station.spectra is not None]
     if stations:
@@ -86,7 +79,7 @@ def reported(
         if region.epicentre is None:
             region = region._replace(epicentre=_epicentre(known))
         _report_pairs(settings, folder, stations, coverage, region, known, report)
-    progress("report", 1, 1)
+    context.progress("report", 1, 1)
     return report
 
 

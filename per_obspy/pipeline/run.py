@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError
 from per_obspy.jobs.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
-from per_obspy.jobs.parallel import prepare_workers
+from per_obspy.jobs.parallel import Workers, prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
 from per_obspy.tables.ranked_table import table_outputs
-from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
     from per_obspy.records.fdsn.cache import Fetched
@@ -82,8 +81,7 @@ def run(
         _prepare_workers(settings, executor)
         from per_obspy.pipeline.stages import new_run
 
-        means = (executor, progress)
-        return new_run(asked, fetched, head, means, dict(facts or {}))
+        return new_run(asked, asked.context(executor, progress), fetched, head, dict(facts or {}))
 
 
 def screen(
@@ -105,7 +103,7 @@ def screen(
         _prepare_workers(asked.settings, executor)
         from per_obspy.pipeline.stages import new_screening
 
-        return new_screening(asked, executor, progress)
+        return new_screening(asked, asked.context(executor, progress))
 
 
 def report(
@@ -124,13 +122,13 @@ def report(
         record = _finished(asked.folder / RECORD)
         from per_obspy.pipeline.stages import new_report
 
-        return new_report(asked, record, progress)
+        return new_report(asked.context(None, progress), record)
 
 
 def _prepare_workers(settings: Run, executor: Executor | None) -> None:
     """Let workers load their libraries while this process loads its own, unless others work."""
     if executor is None and settings.engine.dask is None:
-        prepare_workers(settings.workers or usable_processors())
+        prepare_workers(Workers(settings.workers).count)
 
 
 def _fetched_records(settings: Run, progress: Progress) -> "Fetched | None":

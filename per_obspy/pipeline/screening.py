@@ -4,7 +4,6 @@ import math
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -18,19 +17,18 @@ from per_obspy.inventory.files.reading import PairChunk, PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, do_chunks
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.parts import Part, rejections, remove_other_parts
-from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
+from per_obspy.jobs.risk_cells import WORK, write_cells, write_texts
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.losses import areas_left_out, search_of_tables
 from per_obspy.pipeline.pairs import pair_files
+from per_obspy.pipeline.provenance import RunContext
 from per_obspy.pipeline.results.served_stations import Served
 from per_obspy.pipeline.stations import simulated_motion
-from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.tables.coverage import Coverage, CoverageTally
 from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
-from per_obspy.threads import usable_processors
 
 #: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
 CHUNKS_PER_WORKER = 4
@@ -90,49 +88,39 @@ class Screened(NamedTuple):
 
 
 def screened(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    rejected: Iterable[Rejection],
-    executor: Executor | None,
-    progress: Progress,
+    context: RunContext, stations: Sequence[FinishedStation], rejected: Iterable[Rejection]
 ) -> Screened:
     """
     Write the risk table and the rejections of an inventory of any size.
 
     Parameters
     ----------
-    settings : Run
-        Settings of the run.
-    folder : Path
-        Of the results.
+    context : RunContext
+        The run.
     stations : sequence of FinishedStation
         With station files; if there is none and no ShakeMap, only ``rejected.csv`` is written.
     rejected : iterable of Rejection
         Rejections of the earlier stages.
-    executor : Executor, optional
-        Where to work instead of processes of this machine.
-    progress : callable
-        Called for every chunk.
 
     Raises
     ------
     CatalogError
         If the inventory is wrong as a whole.
     """
+    settings, folder = context.settings, context.folder
     maps = shakemap_files(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
     screens = _parts if stations or maps else _no_parts
-    parts, notes, tally = screens(settings, folder, ground, executor, progress)
+    parts, notes, tally = screens(context, ground)
     states, served, rows = Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     if any(part.path for part in parts):
         facts = _facts(settings, stations)
-        files, states, served = _ranked(settings, folder, parts, facts, executor, progress)
+        files, states, served = _ranked(context, parts, facts)
         # Rows of buildings are read from it
-        rows = building_rows(settings, folder, ground, facts, executor, progress)
+        rows = building_rows(context, ground, facts)
         outputs += files + rows.outputs
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
@@ -147,27 +135,20 @@ def screened(
     )
 
 
-def _ranked(
-    settings: Run,
-    folder: Path,
-    parts: Sequence[Part],
-    facts: dict[str, str],
-    executor: Executor | None,
-    progress: Progress,
-) -> RiskFiles:
+def _ranked(context: RunContext, parts: Sequence[Part], facts: dict[str, str]) -> RiskFiles:
     """Write the risk table of all parts, in one file or one per cell."""
+    settings, folder = context.settings, context.folder
     tables = [part.path for part in parts if part.path]
     pairs = sum(pq.read_metadata(table.absolute()).num_rows for table in tables)
     if pairs >= settings.dataset_from:
-        means = Means(settings.workers or usable_processors(), executor, progress)
-        risk = write_cells(parts, folder, facts, settings.dataset_cell, means)
+        risk = write_cells(parts, folder, facts, settings.dataset_cell, context.workers)
         texts = write_texts(risk.files, folder, settings.csv_rows)
         return risk._replace(files=[*risk.files, *texts])
-    progress("ranking", 0, 1)
+    context.progress("ranking", 0, 1)
     risk = write_risk(tables, folder, facts, settings.csv_rows)
     # Cells that a killed run has begun are of no use
     shutil.rmtree(folder / WORK, ignore_errors=True)
-    progress("ranking", 1, 1)
+    context.progress("ranking", 1, 1)
     return risk
 
 
@@ -200,19 +181,17 @@ def shakemap_files(settings: Run) -> tuple[Path, ...]:
     return tuple(path for path in maps if path)
 
 
-def _parts(
-    settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
-) -> tuple[list[Part], PairNotes, CoverageTally]:
+def _parts(context: RunContext, ground: GroundFiles) -> tuple[list[Part], PairNotes, CoverageTally]:
     """Compute the chunks, and return the parts in order, sentences and what is left out."""
+    settings, folder, progress = context.settings, context.folder, context.progress
     inventory = _inventory(settings, folder, ground)
     progress("screening", 0, inventory.count)
     # Rows are counted as chunks are finished, in whichever order
     parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
     tally = CoverageTally(search_of_tables(inventory.rows))
-    workers = settings.workers or usable_processors()
-    size = _chunk_rows(inventory.count, workers)
+    size = _chunk_rows(inventory.count, context.workers.count)
     jobs = _jobs(settings, folder, ground, inventory.chunks(size), raw)
-    for part in do_chunks(jobs, workers, executor):
+    for part in do_chunks(jobs, context.workers):
         parts.append(part)
         rows += part.rows
         # What is left out is read back chunk by chunk, never as a whole

@@ -7,7 +7,7 @@ only then the other results are complete, and a run of the same inputs is up to 
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.inputs.preflight import check_inputs
 from per_obspy.pipeline.losses import losses, number_of_rows
-from per_obspy.pipeline.provenance import RunSettings
+from per_obspy.pipeline.provenance import RunContext, RunSettings
 from per_obspy.pipeline.report import reported
 from per_obspy.pipeline.results.served_stations import (
     KnownStations,
@@ -48,7 +48,7 @@ from per_obspy.pipeline.stations import (
     simulated_stations,
     stations_of_earlier_run,
 )
-from per_obspy.progress import Progress, timed
+from per_obspy.progress import timed
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.resume import write_status
 from per_obspy.screening.warmup import compiling
@@ -59,9 +59,9 @@ from per_obspy.tables.station_summary import StationSummary, write_stations
 
 def new_run(
     asked: RunSettings,
+    context: RunContext,
     fetched: Fetched | None,
     head: dict[str, Any] | None,
-    means: tuple[Executor | None, Progress],
     facts: dict[str, Any],
 ) -> Result:
     """
@@ -71,34 +71,34 @@ def new_run(
     ----------
     asked : RunSettings
         What to do, and where.
+    context : RunContext
+        The same for the stages.
     fetched : Fetched or None
         Records of FDSN services.
     head : dict or None
         Key, configuration and inputs; inputs are hashed as they are read if not given.
-    means : tuple
-        Executor, or None for processes of this machine, and progress.
     facts : dict
         Further plain values for ``run.json``.
     """
-    settings, folder, progress = asked.settings, asked.folder, means[1]
-    drawn = write_drawn_pairs(settings, folder, progress)
+    settings, folder = context.settings, context.folder
+    drawn = write_drawn_pairs(settings, folder, context.progress)
     check_inputs(settings, folder)
     earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
     seconds, started = dict[str, float](), now()
     with timed(seconds, "records"):
-        found = find_station_jobs(settings, folder, fetched, progress)
+        found = find_station_jobs(context, fetched)
         head = head or asked.head(fetched, found.hashes)
     # From here on the folder describes an unfinished run
-    record = facts | _all_stages(settings, folder, found, means, facts)
+    record = facts | _all_stages(context, found, facts)
     record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
     return _finished_record(settings, folder, record, head, earlier_rows)
 
 
-def new_screening(asked: RunSettings, executor: Executor | None, progress: Progress) -> Result:
+def new_screening(asked: RunSettings, context: RunContext) -> Result:
     """Screen the pairs with the stations of the latest run, whose output folder is locked."""
-    settings, folder = asked.settings, asked.folder
+    settings, folder = context.settings, context.folder
     found = _earlier_stations(settings, folder)
-    drawn = write_drawn_pairs(settings, folder, progress)
+    drawn = write_drawn_pairs(settings, folder, context.progress)
     check_inputs(settings, folder)
     earthquakes, known = earlier_facts(folder / RECORD)
     stations, trusted = compared_stations(found, earthquakes, settings.records)
@@ -109,21 +109,24 @@ def new_screening(asked: RunSettings, executor: Executor | None, progress: Progr
     head["key"] = f"screening of stations as they were at {started}"
     rejected = all_rejections([], stations)
     # On a cluster the folder is shared until the report is written
-    with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
-        record = _later_stages(settings, folder, stations, rejected, used, progress)
+    with (
+        opened_executor(settings.engine, context.workers, folder) as used,
+        compiling(context.progress),
+    ):
+        record = _later_stages(replace(context, workers=used), stations, rejected)
     record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
     record["trusted"] = trusted
     _add_stations(record, known)
     return _finished_record(settings, folder, record, head, earlier_rows)
 
 
-def new_report(asked: RunSettings, record: dict[str, Any], progress: Progress) -> Result:
+def new_report(context: RunContext, record: dict[str, Any]) -> Result:
     """Write the report of a finished run with this record again; its output folder is locked."""
-    settings, folder = asked.settings, asked.folder
+    settings, folder = context.settings, context.folder
     earlier = _earlier_stations(settings, folder)
     stations, _ = compared_stations(earlier, record.get("earthquakes", ()), settings.records)
     coverage = Coverage.of_record(record)
-    made = reported(settings, folder, _usable(stations), coverage, progress)
+    made = reported(context, _usable(stations), coverage)
     outputs = record["outputs"] | file_hashes(folder, made.outputs)
     # A picture or layer that failed is made by the next run
     key = "" if made.faults else record["key"]
@@ -146,26 +149,22 @@ def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
 
 
 def _all_stages(
-    settings: Run,
-    folder: Path,
-    found: FoundStations,
-    means: tuple[Executor | None, Progress],
-    facts: Mapping[str, object],
+    context: RunContext, found: FoundStations, facts: Mapping[str, object]
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
-    executor, progress = means
+    settings, folder = context.settings, context.folder
     seconds = dict[str, float]()
-    with opened_executor(settings.engine, executor, folder) as used:
-        noted = noted_engine(folder / RECORD, used)
-        with timed(seconds, "stations"), compiling(progress), noted:
-            progress("stations", 0, len(found.jobs))
-            done = finished_stations(found.jobs, settings.workers, used, progress)
+    with opened_executor(settings.engine, context.workers, folder) as used:
+        noted = noted_engine(folder / RECORD, used.executor)
+        with timed(seconds, "stations"), compiling(used.progress), noted:
+            used.progress("stations", 0, len(found.jobs))
+            done = finished_stations(found.jobs, used)
         # Only now every station has its neighbours
         stations, trusted = compared_stations(done, found.earthquakes, settings.records)
         _begun(folder, settings, SCREENING, found.earthquakes, facts)
         # From here on no record is needed
         rejected = all_rejections(found.rejected, stations)
-        record = _later_stages(settings, folder, stations, rejected, used, progress)
+        record = _later_stages(replace(context, workers=used), stations, rejected)
     record |= {"earthquakes": found.earthquakes, "trusted": trusted}
     _add_stations(record, found.known)
     record["intermediate"] = _intermediate_hashes(folder, done, found.hashes)
@@ -221,21 +220,17 @@ def _finished_record(
 
 
 def _later_stages(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    rejected: Sequence[Rejection],
-    executor: Executor | None,
-    progress: Progress,
+    context: RunContext, stations: Sequence[FinishedStation], rejected: Sequence[Rejection]
 ) -> dict[str, Any]:
     """Do the stages after the stations and return their part of ``run.json``."""
+    settings, folder, executor = context.settings, context.folder, context.workers.executor
     seconds, usable = dict[str, float](), _usable(stations)
     # The risk table, then everything that is read from it
     with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
-        found = screened(settings, folder, usable, rejected, executor, progress)
+        found = screened(context, usable, rejected)
         table = _write_stations(usable, rejected, found, folder)
     with timed(seconds, "report"):
-        made = reported(settings, folder, usable, found.coverage, progress)
+        made = reported(context, usable, found.coverage)
         outputs = [*found.outputs, *table.files, *made.outputs]
     outcome = _outcome(found, stations)
 

@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,8 +12,10 @@ import xarray as xr
 from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spectra, load
 from per_obspy.errors import CatalogError, Rejection, WriteError
 from per_obspy.files import content_hash, is_part, remove_file
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
 from per_obspy.names import inside
+from per_obspy.pipeline.provenance import RunContext
 from per_obspy.pipeline.results.run_facts import with_event
 from per_obspy.pipeline.results.served_stations import KnownStations
 from per_obspy.progress import Progress
@@ -27,7 +28,6 @@ from per_obspy.screening.ground_motion.amplitudes import Earthquake
 from per_obspy.screening.ground_motion.site_motion import hypocentre_of
 from per_obspy.screening.ground_motion.station_comparison import Comparison, compare_stations
 from per_obspy.simulation.earthquake import simulate, write_simulation
-from per_obspy.threads import usable_processors
 
 #: Stations that a message names.
 NAMED = 10
@@ -58,28 +58,23 @@ class FoundStations(NamedTuple):
     known: KnownStations = KnownStations()
 
 
-def find_station_jobs(
-    settings: Run, folder: Path, fetched: Fetched | None, progress: Progress
-) -> FoundStations:
+def find_station_jobs(context: RunContext, fetched: Fetched | None) -> FoundStations:
     """
     Find the stations of a run; simulated records are written into the output folder first.
 
     Parameters
     ----------
-    settings : Run
-        Settings of the run.
-    folder : Path
-        Of the results.
+    context : RunContext
+        The run.
     fetched : Fetched or None
         Records of FDSN services in their cache.
-    progress : callable
-        Called when simulating and finding begin and end.
 
     Raises
     ------
     CatalogError
         If a source of records is wrong as a whole.
     """
+    settings, folder, progress = context.settings, context.folder, context.progress
     scenario = load(settings.simulation, Simulation).scenario if settings.simulation else None
     if scenario:
         _write_simulated_records(scenario, folder, progress)
@@ -157,9 +152,7 @@ def file_stem(station: str) -> str:
     return station.removeprefix(".") or "unnamed"
 
 
-def finished_stations(
-    jobs: Sequence[StationJob], workers: int, executor: Executor | None, progress: Progress
-) -> list[FinishedStation]:
+def finished_stations(jobs: Sequence[StationJob], workers: Workers) -> list[FinishedStation]:
     """
     Do the jobs and return every station, sorted by name.
 
@@ -171,9 +164,9 @@ def finished_stations(
     finished = []
     # A failure to write is no property of the stations that wait
     try:
-        for station in do_stations(jobs, workers or usable_processors(), executor):
+        for station in do_stations(jobs, workers):
             finished.append(station)
-            progress("stations", len(finished), len(jobs))
+            workers.progress("stations", len(finished), len(jobs))
     except WriteError as error:
         done = {station.station for station in finished}
         waiting = {job.station for job in jobs} - done

@@ -18,9 +18,9 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.files import file_hash
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.parts import Part
-from per_obspy.jobs.risk_cells import Means, write_cells, write_texts
-from per_obspy.progress import silent
+from per_obspy.jobs.risk_cells import write_cells, write_texts
 from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables.parts import write_part
@@ -58,7 +58,7 @@ def write_table(parts: list[Part], folder: Path, cell: float) -> None:
     if not cell:
         write_risk([part.path for part in parts if part.path], folder, facts, 100_000)
         return
-    write_cells(parts, folder, facts, cell, Means(1, None, silent))
+    write_cells(parts, folder, facts, cell, Workers(1))
     write_texts(table_files(folder), folder, 100_000)
 
 

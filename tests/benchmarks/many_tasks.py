@@ -20,7 +20,7 @@ from distributed import Client
 
 from per_obspy.config.engine import Engine
 from per_obspy.jobs.cluster.dask_executor import DaskExecutor
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, Workers, results
 
 TASKS, WORKERS = (1_000, 10_000, 100_000), 2
 
@@ -114,11 +114,11 @@ def main(counts: Sequence[int]) -> None:
         ):
             observer.wait_for_workers(WORKERS)
             work: Work[bytes, int] = Work(len, failed)
-            assert sum(results([bytes(SIZE)] * FIRST, work, 1, executor)) == FIRST * SIZE
+            assert sum(results([bytes(SIZE)] * FIRST, work, Workers(1, executor))) == FIRST * SIZE
             start = used(observer)
             print(HEADER, row(0, start, start), sep="\n", flush=True)
             tasks = (bytes(SIZE) for _ in range(max(counts)))
-            for number, result in enumerate(results(tasks, work, 1, executor), 1):
+            for number, result in enumerate(results(tasks, work, Workers(1, executor)), 1):
                 assert result == SIZE
                 if number in counts:
                     print(row(number, start, used(observer)), flush=True)

@@ -31,13 +31,13 @@ CHECKOUT = Path(__file__).parents[2]
 WORKER = """
 import contextlib, time
 from per_obspy.jobs import worker_start
-from per_obspy.jobs.parallel import Work, prepare_workers, results
+from per_obspy.jobs.parallel import Workers, Work, prepare_workers, results
 with {context}:
     prepare_workers(2)
     import per_obspy.pipeline.stages
     start = time.perf_counter()
     task = "__import__('per_obspy.jobs.station') and 0"
-    next(results([task] * 2, Work(eval, print), 2, None))
+    next(results([task] * 2, Work(eval, print), Workers(2)))
     print(time.perf_counter() - start)
 """
 

@@ -10,6 +10,7 @@ import pytest
 from per_obspy.buildings.columns import ROWS
 from per_obspy.jobs import building_rows
 from per_obspy.jobs.building_rows import RowsJob, do_row_chunks
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.parts import rejections
 
 
@@ -31,7 +32,7 @@ def jobs(tmp_path):
 
 
 def done(jobs):
-    return list(do_row_chunks(jobs, 1, None))
+    return list(do_row_chunks(jobs, Workers(1)))
 
 
 def test_without_a_record_there_is_no_history(jobs):

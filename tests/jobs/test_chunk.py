@@ -11,6 +11,7 @@ from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs import chunk
 from per_obspy.jobs.chunk import ChunkJob, do_chunks
 from per_obspy.jobs.ground_files import ground_files
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.parts import rejections
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
@@ -36,7 +37,7 @@ def make_jobs(tmp_path):
 
 
 def done(jobs):
-    return sorted(do_chunks(jobs, 1, None), key=lambda part: part.number)
+    return sorted(do_chunks(jobs, Workers(1)), key=lambda part: part.number)
 
 
 def reasons(parts):

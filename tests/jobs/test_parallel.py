@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from per_obspy.errors import CatalogError, Unfinished, WriteError
-from per_obspy.jobs.parallel import AHEAD, DIED, Work, results
+from per_obspy.jobs.parallel import AHEAD, DIED, Work, Workers, results
 
 #: Ends a process as the system does with one that takes too much memory.
 DIES = "__import__('os')._exit(9)"
@@ -41,12 +41,12 @@ def _full(number):
 def test_a_machine_that_cannot_write_stops_all_tasks(executor):
     # would catch a full disk that is noted as a fault of every task
     with pytest.raises(WriteError, match=r"\.nc: cannot be written: No space left on device"):
-        list(results(iter(range(100)), Work(_full, failed), 1, executor))
+        list(results(iter(range(100)), Work(_full, failed), Workers(1, executor)))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_task_has_a_result_or_a_reason(workers):
-    found = list(results(iter([1, -2, 9, 16]), Work(isqrt, failed), workers, None))
+    found = list(results(iter([1, -2, 9, 16]), Work(isqrt, failed), Workers(workers)))
     assert sorted(map(str, found)) == sorted(
         ["1", "-2: ValueError: isqrt() argument must be nonnegative", "3", "4"]
     )
@@ -57,7 +57,9 @@ def _refused(number):
 
 
 def test_wrong_input_is_no_error_of_the_program():
-    assert list(results([7], Work(_refused, failed), 1, None)) == ["7: pairs.csv: row 7 is no row"]
+    assert list(results([7], Work(_refused, failed), Workers(1))) == [
+        "7: pairs.csv: row 7 is no row"
+    ]
 
 
 def test_a_worker_that_dies_takes_only_its_task_with_it():
@@ -67,7 +69,7 @@ def test_a_worker_that_dies_takes_only_its_task_with_it():
     tasks = [DIES if number == 3 else str(number) for number in numbers]
     found = list[int]()
     with pytest.raises(Unfinished) as unfinished:
-        found.extend(results(tasks, Work(eval, failed), 2, None))
+        found.extend(results(tasks, Work(eval, failed), Workers(2)))
     # a killed worker is a fault of the machine: its task has no result, all others have
     assert unfinished.value.faults == (f"{DIES}: {DIED}",)
     numbers.remove(3)
@@ -76,11 +78,11 @@ def test_a_worker_that_dies_takes_only_its_task_with_it():
 
 SLEEPS = """
 import os, sys, time
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, Workers, results
 notes = f"open({sys.argv[1]!r} + str(__import__('os').getpid()), 'w').close()"
 task = f"{notes} or __import__('time').sleep(100)"
 if __name__ == "__main__":
-    list(results([task, task], Work(eval, lambda *_: None), 2, None))
+    list(results([task, task], Work(eval, lambda *_: None), Workers(2)))
 """
 
 
@@ -115,7 +117,7 @@ def test_workers_end_when_the_run_is_killed(tmp_path):
 
 
 def test_an_executor_that_was_given_does_the_work():
-    assert sorted(results([1, 4, 9], Work(isqrt, failed), 1, InProcess())) == [1, 2, 3]
+    assert sorted(results([1, 4, 9], Work(isqrt, failed), Workers(1, InProcess()))) == [1, 2, 3]
 
 
 def test_few_tasks_are_ahead_of_their_results():
@@ -126,7 +128,7 @@ def test_few_tasks_are_ahead_of_their_results():
             asked.append(number)
             yield number
 
-    found = results(tasks(), Work(isqrt, failed), 2, None)
+    found = results(tasks(), Work(isqrt, failed), Workers(2))
     for done in range(1, 20):
         next(found)
         assert len(asked) <= done + 2 * AHEAD  # would catch a pool that takes all tasks at once
@@ -135,7 +137,7 @@ def test_few_tasks_are_ahead_of_their_results():
 
 
 def test_nothing_to_do_is_done():
-    assert list(results([], Work(isqrt, failed), 2, None)) == []
+    assert list(results([], Work(isqrt, failed), Workers(2))) == []
 
 
 def _overlap(task):
@@ -153,5 +155,5 @@ _AT_WORK: list[int] = []
 def test_threads_do_one_task_at_a_time():
     # netCDF ends the process if two threads write: would catch tasks that overlap
     with ThreadPoolExecutor(4) as threads:
-        found = list(results(range(8), Work(_overlap, failed), 4, threads))
+        found = list(results(range(8), Work(_overlap, failed), Workers(4, threads)))
     assert found == [1] * 8

@@ -16,9 +16,9 @@ import pytest
 
 from per_obspy.errors import PerError
 from per_obspy.files import file_hash
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.parts import Part
-from per_obspy.jobs.risk_cells import Means, write_cells, write_texts
-from per_obspy.progress import silent
+from per_obspy.jobs.risk_cells import write_cells, write_texts
 from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables import ranked_cells
@@ -83,7 +83,7 @@ def parts_of(rows, folder, size):
 
 
 def written(parts, folder, executor=None):
-    return write_cells(parts, folder, FACTS, 1.0, Means(1, executor, silent))
+    return write_cells(parts, folder, FACTS, 1.0, Workers(1, executor))
 
 
 def contents(folder):

@@ -10,7 +10,7 @@ import xarray as xr
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.errors import CatalogError, Unfinished, WrongOutput
 from per_obspy.jobs import station as jobs
-from per_obspy.jobs.parallel import DIED
+from per_obspy.jobs.parallel import DIED, Workers
 from per_obspy.jobs.station import StationJob, do_stations, earlier_station
 from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.folder import read_station
@@ -54,7 +54,7 @@ def make_jobs(records, tmp_path):
 
 
 def done(jobs, workers=1):
-    return sorted(do_stations(jobs, workers), key=lambda station: station.station)
+    return sorted(do_stations(jobs, Workers(workers)), key=lambda station: station.station)
 
 
 def test_a_finished_station_carries_its_spectra_and_the_hash_of_its_shard(make_jobs):
@@ -131,7 +131,7 @@ def test_an_earlier_station_is_found_by_its_status(make_jobs):
 
 
 def test_finished_stations_travel_to_other_processes(make_jobs):
-    first = {station.station: station for station in do_stations(make_jobs(), workers=2)}
+    first = {station.station: station for station in do_stations(make_jobs(), Workers(2))}
     # the same job in this process
     for station in done([job._replace(shard=job.shard.with_stem("a")) for job in make_jobs()]):
         xr.testing.assert_identical(first[station.station].spectra, station.spectra)
@@ -158,7 +158,7 @@ def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
     batch[2] = batch[2]._replace(reader=partial(read_station, Poison()))
     stations = list[str]()
     with pytest.raises(Unfinished) as unfinished:
-        stations.extend(station.station for station in do_stations(batch, workers=2))
+        stations.extend(station.station for station in do_stations(batch, Workers(2)))
     # the guilty one has no result that a later run could take for one
     assert unfinished.value.faults == (f"station XX.S2: {DIED}",)
     assert sorted(stations) == ["XX.S0", "XX.S1", "XX.S3"]
@@ -171,7 +171,7 @@ def _raises(job):
 
 def test_whatever_a_worker_raises_becomes_a_reason(monkeypatch, tmp_path):
     monkeypatch.setattr(jobs, "do_station", _raises)
-    (station,) = do_stations([empty_job("XX.S1", tmp_path)], workers=2)
+    (station,) = do_stations([empty_job("XX.S1", tmp_path)], Workers(2))
     assert station.rejected[0].reasons == ("RuntimeError: no luck with XX.S1",)
 
 

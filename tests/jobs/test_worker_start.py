@@ -17,12 +17,12 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are for
 PROGRAM = """
 import os, sys, time
 from per_obspy.jobs import worker_start
-from per_obspy.jobs.parallel import Work, prepare_workers, results
+from per_obspy.jobs.parallel import Workers, Work, prepare_workers, results
 worker_start.LOADED = ("colorsys",)
 FACTS = "(__import__('os').getppid(), 'colorsys' in __import__('sys').modules)"
 with worker_start.forked_workers():
     prepare_workers(2)
-    found = [*results([FACTS] * 4, Work(eval, lambda task, reason: reason), 2, None)]
+    found = [*results([FACTS] * 4, Work(eval, lambda task, reason: reason), Workers(2))]
     assert {loaded for _, loaded in found} == {True}, found
     server, = {parent for parent, _ in found}
     print(server, os.getpid(), flush=True)

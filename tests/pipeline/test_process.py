@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from per_obspy.cli import app
 from per_obspy.config import Processing, Scenario
 from per_obspy.errors import CatalogError
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.process import process_records
 from per_obspy.processing.chain import process_station
-from per_obspy.progress import silent
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.processed_files import described, write_description, write_processed
@@ -25,7 +25,7 @@ from per_obspy.tables.station_summary import RECORD_COLUMNS
 from per_obspy.tables.table_files import rounded
 
 RATE, COUNT = 50.0, 3000
-ONE = (1, None, silent)
+ONE = Workers(1)
 
 
 def motion(seed):

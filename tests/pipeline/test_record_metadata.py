@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from per_obspy.config import Interpolation, Processing, Records
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.process import process_records
 from per_obspy.processing.chain import process_station
-from per_obspy.progress import silent
 from per_obspy.records.sources import find_sources
 from per_obspy.screening.ground_motion.site_motion import hypocentre_of, prepared_field
 from per_obspy.spectra.station import station_spectra
@@ -63,7 +63,7 @@ def test_everything_reaches_the_field_and_the_table(folder: Path):
 
 
 def test_processed_records_keep_all_of_it(folder: Path, tmp_path: Path):
-    process_records([folder], tmp_path, Processing(), None, False, (1, None, silent))
+    process_records([folder], tmp_path, Processing(), None, False, Workers(1))
     (trace, *_) = json.loads((tmp_path / "stations" / "TK.4414.json").read_text())["traces"]
     assert trace["coordinates_source"] == "stations.csv"
     assert "header 38.4069" in trace["coordinates_conflict"]

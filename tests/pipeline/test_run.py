@@ -24,9 +24,9 @@ from per_obspy.config import Processing
 from per_obspy.errors import FolderInUse
 from per_obspy.jobs import station as jobs
 from per_obspy.jobs.output_folder import Result
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import report, run, screen
-from per_obspy.progress import silent
 from per_obspy.screening.ranking import STATES
 from per_obspy.tables.table_files import rounded_table
 
@@ -124,9 +124,7 @@ def test_simulated_motion_is_marked_everywhere(finished):
 def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copied, tmp_path):
     # the folder of `per-obspy simulate`, copied, and what `per-obspy process` makes of it
     shutil.copytree(copied / "out" / "simulated", copied / "raw")
-    process_records(
-        [copied / "raw"], copied / "clean", Processing(), None, False, (1, None, silent)
-    )
+    process_records([copied / "raw"], copied / "clean", Processing(), None, False, Workers(1))
     for source in ("raw", "clean"):
         shutil.rmtree(tmp_path / "records", ignore_errors=True)
         shutil.copytree(copied / source, copied / "records")

@@ -9,9 +9,9 @@ from obspy import Stream, Trace
 import per_obspy
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.errors import CatalogError
+from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.process import plot_station, spectra_of
 from per_obspy.pipeline.stations import file_stem
-from per_obspy.progress import silent
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
@@ -29,7 +29,7 @@ def records(tmp_path_factory):
 
 
 def spectra(records, folder):
-    return spectra_of([records], folder / "spectra.nc", Processing(), GRID, (1, None, silent))
+    return spectra_of([records], folder / "spectra.nc", Processing(), GRID, Workers(1))
 
 
 def test_one_file_holds_the_spectra_of_all_shards(records, tmp_path):
@@ -62,9 +62,9 @@ def test_a_part_file_of_a_killed_process_is_removed(records, tmp_path):
 def test_files_of_a_station_in_several_sources_are_joined(records, tmp_path):
     sources = [records / "XX.S001.mseed", records / "stations.xml", records]
     with pytest.raises(CatalogError, match="there is only metadata"):
-        spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, (1, None, silent))
+        spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, Workers(1))
     sources = [records, records / "XX.S001.mseed"]
-    done, _ = spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, (1, None, silent))
+    done, _ = spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, Workers(1))
     # metadata of the folder serves the single file
     assert [station.shard is not None for station in done] == [True, True]
 

@@ -9,7 +9,9 @@ import xarray as xr
 
 from per_obspy.config import Processing, Run, Spectra, load
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.jobs.parallel import Workers
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.provenance import RunContext
 from per_obspy.pipeline.stations import (
     all_rejections,
     find_station_jobs,
@@ -44,7 +46,9 @@ def found(settings):
         if done == total:
             stages.append(stage)
 
-    return stages, find_station_jobs(settings, settings.output, None, progress)
+    return stages, find_station_jobs(
+        RunContext(settings, settings.output, Workers(1, progress=progress)), None
+    )
 
 
 def test_every_station_has_a_job_with_the_hashes_of_its_files(settings):
@@ -128,7 +132,7 @@ def test_another_scenario_leaves_no_record_of_this_one(settings, tmp_path):
 
 def test_an_earlier_run_has_its_stations(settings):
     _, (jobs, *_) = found(settings)
-    done = finished_stations(jobs, 1, None, lambda *_: None)
+    done = finished_stations(jobs, Workers(1))
     (settings.output / "stations" / ".XX.S003.1.part.json").write_text("{")
     again = stations_of_earlier_run(settings.output)
     # would catch half a status that is taken for a station

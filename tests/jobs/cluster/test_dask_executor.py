@@ -14,7 +14,7 @@ from per_obspy.config.engine import Engine
 from per_obspy.errors import ServiceError, TryLater, Unfinished
 from per_obspy.jobs.cluster import worker_side
 from per_obspy.jobs.cluster.dask_executor import DaskExecutor, present_workers
-from per_obspy.jobs.parallel import AHEAD, Work, results
+from per_obspy.jobs.parallel import AHEAD, Work, Workers, results
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
@@ -53,7 +53,7 @@ def client(cluster):
 def done(executor, folder, tasks, engine=None):
     """Return the results of expressions."""
     with executor.sharing(folder, engine or Engine(retries=1, wait=30)):
-        return list(results(tasks, Work(eval, failed), 1, executor))
+        return list(results(tasks, Work(eval, failed), Workers(1, executor)))
 
 
 def reasons(executor):
@@ -95,7 +95,7 @@ def test_few_tasks_are_ahead_of_their_results(executor, tmp_path):
             yield str(number)
 
     with executor.sharing(tmp_path, Engine()):
-        found = results(tasks(), Work(eval, failed), 1, executor)
+        found = results(tasks(), Work(eval, failed), Workers(1, executor))
         for got in range(1, 30):
             next(found)
             # would catch all of 100 000 tasks waiting in the memory of client and scheduler
@@ -114,7 +114,9 @@ def test_a_worker_that_is_killed_loses_no_task(executor, client, tmp_path):
     tasks = ["__import__('time').sleep(0.2)"] * 12
     with executor.sharing(tmp_path, Engine(retries=3, wait=30)):
         found = results(
-            [f"({task}, {n})[1]" for n, task in enumerate(tasks)], Work(eval, failed), 1, executor
+            [f"({task}, {n})[1]" for n, task in enumerate(tasks)],
+            Work(eval, failed),
+            Workers(1, executor),
         )
         first = next(found)
         os.kill(process, signal.SIGKILL)
@@ -202,7 +204,7 @@ def test_a_scheduler_that_ends_leaves_tasks_for_the_next_run(cluster, tmp_path):
         DaskExecutor(cluster.scheduler_address) as executor,
         executor.sharing(tmp_path, Engine(wait=1)),
     ):
-        found = results(tasks, Work(eval, failed), 1, executor)
+        found = results(tasks, Work(eval, failed), Workers(1, executor))
         next(found)
         cluster.close()
         with pytest.raises(Unfinished, match=r"is gone|no usable worker"):
