@@ -156,7 +156,6 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
             is_whole = not isinstance(answer, MemoryError)
         except (EOFError, BrokenPipeError, pickle.UnpicklingError) as error:
             code = _reader.end(is_killed=False)
-            is_whole = True
             raise BeyondLimits(_reason(limits, code, late.is_set())) from error
         finally:
             clock.cancel()

@@ -159,6 +159,7 @@ def _all_results(
         for task in (yield from _on(executor, tasks, watched, ahead)):
             watched.note(task, watched.broken or DIED)
         return
+    # One task alone needs no other process
     remaining = iter(tasks)
     first = list(islice(remaining, 2))
     if min(count, len(first)) <= 1:

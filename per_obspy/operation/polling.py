@@ -47,6 +47,7 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
     if is_paused(now, state.not_before):
         errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
         return state
+    # Runs that are due do not wait for the list
     faults = list[PerError]()
     with noted_faults(faults):
         feed = read_feed(watch, state, _circle(watcher), now)

@@ -198,6 +198,7 @@ def _records_that_came(
     for state in list(states.values()):
         if not is_look_due(watcher, state) or termination.requested():
             continue
+        # Runs that are due do not wait for these
         after, has_come = changed(state, looked=iso(watcher.now())), False
         with noted_faults(errors):
             after, has_come = looked(watcher, state)

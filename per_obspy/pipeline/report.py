@@ -64,6 +64,7 @@ def reported(
         Rows of the pair tables, and those that are left out.
     """
     settings, folder = context.settings, context.folder
+    # Spectra of all stations, as far as there are any
     context.progress("report", 0, 1)
     report, spectra = Report([], []), None
     usable = [station.spectra for station in stations if station.spectra is not None]

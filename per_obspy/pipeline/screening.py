@@ -55,6 +55,10 @@ class PairNotes(NamedTuple):
     recognised: tuple[str, ...] = ()
     suspicions: tuple[str, ...] = ()
 
+    def as_record(self) -> dict[str, list[str]]:
+        """Return the sentences for ``run.json``."""
+        return {name: list(texts) for name, texts in self._asdict().items()}
+
 
 class Screened(NamedTuple):
     """

@@ -245,7 +245,7 @@ def _later_stages(
         **engine_facts(executor),
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
-        "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
+        "pair_tables": found.pair_tables.as_record(),
         "coverage": found.coverage.as_record(),
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
