@@ -77,6 +77,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         system = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
         table.derived[f"system_{i}"] = (system == "").to_numpy(dtype=bool)
         systems[f"system_{i}"] = system.where(system != "", "other")
+    # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
         _add_size(table, i, building)
         _add_period(table, i, building, systems[f"system_{i}"].to_numpy(dtype=str))

@@ -41,6 +41,7 @@ def _coefficients(system: ArrayLike) -> NDArray[Any]:
     unknown = names[~is_system.any(axis=-1)]
     if unknown.size:
         raise ValueError(f"system must be one of {', '.join(SYSTEMS)}, got {str(min(unknown))!r}")
+    # A row of the table for each name
     return np.moveaxis(is_system @ np.array([_COEFFICIENTS[name] for name in SYSTEMS]), -1, 0)
 
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
@@ -16,7 +15,7 @@ from per_obspy.inventory.cells import read_columns
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs, row_names
 from per_obspy.inventory.files.formats import PairFile, pair_file
 from per_obspy.inventory.files.headings import IDENTIFIER
-from per_obspy.inventory.files.raw_rows import RawRows, name_hashes
+from per_obspy.inventory.files.raw_rows import RawRows, name_hashes, stripped
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.suspicions import ODD, Suspicions
 
@@ -127,7 +126,7 @@ def _checked_whole(rows: RawRows, table: pd.DataFrame | None = None) -> pd.DataF
     """Check all rows of a file, or of a table in memory, with suspicions and proposed units."""
     # The account comes first, as the checks leave rows out
     account = Suspicions()
-    repeated = pd.Series(name_hashes(_identifiers(rows.table))).duplicated().to_numpy()
+    repeated = pd.Series(name_hashes(stripped(rows.table[IDENTIFIER]))).duplicated().to_numpy()
     odd = account.add(rows.source, rows.table, rows.lines, repeated)
     if table is None:
         pairs = _checked(rows, None, odd)
@@ -188,7 +187,7 @@ class PairInventory:
         # Read every file before any is refused
         hashes = {}
         for path, file in self._files.items():
-            hashes[path] = [name_hashes(block) for block in file.identifiers()]
+            hashes[path] = [name_hashes(stripped(block)) for block in file.identifiers()]
         for path, blocks in hashes.items():
             self.rows[path] = sum(map(len, blocks))
             if not self.rows[path]:
@@ -232,19 +231,13 @@ def recognised_line(path: Path, recognised: str) -> str:
     return printable(f"{path.name}: read as {recognised}")
 
 
-def _identifiers(table: pa.Table) -> pa.Array:
-    """Return the identifiers of pairs without the blanks around them."""
-    filled = pc.fill_null(table[IDENTIFIER].cast(pa.string()), "")
-    return pc.utf8_trim_whitespace(filled).combine_chunks()
-
-
 def _repeated(table: pa.Table, hashes: NDArray[np.uint64], seen: set[str]) -> NDArray[np.bool_]:
     """
     Return the rows whose identifier occurred before.
 
     Only identifiers whose hash is repeated are added to those seen.
     """
-    text = _identifiers(table)
+    text = stripped(table[IDENTIFIER])
     # A hash may be shared by chance: the identifiers themselves decide
     repeated = np.isin(name_hashes(text), hashes)
     for row in np.flatnonzero(repeated).tolist():

@@ -30,10 +30,10 @@ from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.files import looks_like
 from per_obspy.inventory.cells import is_unknown, read_number
-from per_obspy.inventory.files.headings import Meanings, is_complete, meanings_of
+from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
 from per_obspy.inventory.files.text_cells import given_text
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.schema import missing_columns
 
 #: Bytes read at once.
 BLOCK = 1 << 20
@@ -165,7 +165,7 @@ def _rank(form: TextForm) -> tuple[bool, int, bool]:
     Turkish code page.
     """
     columns = form.meanings.columns
-    is_plain = form.header == 1 and is_complete(set(form.meanings.cells) & set(COLUMNS))
+    is_plain = form.header == 1 and not missing_columns(form.meanings.cells)
     is_turkish = form.encoding == TURKISH_PAGE and form.meanings.language == "tr"
     return is_plain, len(columns), is_turkish
 

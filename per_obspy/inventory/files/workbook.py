@@ -27,9 +27,10 @@ import pyarrow.compute as pc
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, printable, require_extra, shortened
 from per_obspy.files import looks_like
-from per_obspy.inventory.files.headings import Meanings, is_complete, meanings_of
+from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
 from per_obspy.inventory.files.text_cells import given_text
+from per_obspy.inventory.schema import missing_columns
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
 
 #: Processor time and memory of the library.
@@ -151,7 +152,7 @@ def _pair_sheet(file: Path, sheets: Mapping[str, pa.Table], given: TableForm) ->
         reason = f"no sheet {given.sheet!r:.60} with cells" if given.sheet else "no sheet has cells"
         raise CatalogError(str(file), f"{reason}; there are {_listed(sheets)}")
     # Of several pair tables the user chooses one
-    whole = [sheet for sheet in tables if is_complete(set(sheet.meanings.names))]
+    whole = [sheet for sheet in tables if not missing_columns(sheet.meanings.names)]
     if len(whole) > 1:
         listed = _listed(sheet.name for sheet in whole)
         mend = f'give sheet = "{whole[0].name}" or another one in [pairs]'
