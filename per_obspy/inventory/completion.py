@@ -189,7 +189,8 @@ def _add_contact(table: _Columns, building: config.Building) -> None:
         table.fill(f"participation_{i}", np.nan_to_num(share, nan=1.0))
     # Of floors that are equally high within a building, where all is given
     sizes = [table.given(f"{name}_{i}") for i in (1, 2) for name in ("height", "storeys")]
-    table.fill("floor_offset", floor_offset(*sizes))
+    offset = np.where(np.isnan(sizes).any(axis=0), np.nan, floor_offset(*sizes))
+    table.fill("floor_offset", offset)
     table.fill("restitution", building.restitution)
 
 

@@ -255,7 +255,7 @@ class Suspicions:
         # Each difference of either building, with the columns of the first one
         for name, columns in _SEEN_IN.items():
             places = otherwise.get(name, np.empty(0, dtype=np.intp))
-            rows = np.unique(places // 2)
+            rows = np.flatnonzero(np.bincount(places // 2))
             flags["contradicting_building"][rows] = True
             side = int(places[0] % 2) + 1 if places.size else 1
             quoted = [f"{column}_{side}" for column in ("building_id", *columns)]

@@ -6,7 +6,7 @@ identifiers that may occur twice, then block by block.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -171,20 +171,13 @@ class PairFile:
         common = _Common(self._contents, self.names)
         for rows in self._blocks(common.names) if common.names else ():
             common.add(rows)
-        marks, meanings = self._marks(common.evidence), self.meanings
-        form = CellForm(meanings.units, marks, meanings.language, common.gap_unit)
-        return form, common.types
-
-    def _marks(self, evidence: Mapping[str, Evidence]) -> dict[str, str]:
-        """Return the decimal mark of each column that has commas."""
-        if self._given.decimal:
-            commas = [name for name, column in evidence.items() if column.has_commas]
-            return dict.fromkeys(commas, self._given.decimal)
         # The user has to decide if no number in the file does
-        marks, doubtful = marks_of(evidence)
+        marks, doubtful = marks_of(common.evidence, self._given.decimal or "")
         for name, column in doubtful.items():
             raise CatalogError(self._contents.source, two_readings(name, column))
-        return marks
+        meanings = self.meanings
+        form = CellForm(meanings.units, marks, meanings.language, common.gap_unit)
+        return form, common.types
 
     def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
         """Return a column of text as numbers if every cell is one, else as text."""
