@@ -88,7 +88,7 @@ def checked_pairs(
     if lines is None:
         lines = np.arange(2, len(table) + 2)
     # Every fault of every row: of cells, of names, and of values beside others
-    pairs, faults = _converted(table.assign(pair_id=row_names(table, lines)))
+    pairs, faults = _converted(table.assign(pair_id=row_names(table.get("pair_id"), lines)))
     # Names of earlier rows, and values that contradict each other or the world
     names, rows = pairs["pair_id"], PairRows(pairs)
     again = (names.duplicated() if repeated is None else repeated) & (names != "")
@@ -117,28 +117,16 @@ def _accepted(
     return accepted
 
 
-def row_names(table: pd.DataFrame, lines: NDArray[np.int64], prefix: str = "") -> pd.Series:
-    """
-    Return the identifiers of pairs, the number of its row where a pair has none.
-
-    Parameters
-    ----------
-    table : DataFrame
-        With or without the column ``pair_id``.
-    lines : (n_rows,) ndarray of int
-        Line of each row in its file.
-    prefix : str, optional
-        What names the file, where an inventory has several.
-    """
-    # Names as they are given, and numbers for the others
-    empty = pd.Series("", index=range(len(table)), dtype=object)
-    names = read_texts("pair_id", table["pair_id"])[0] if "pair_id" in table else empty
-    missing = np.flatnonzero(names == "")
-    if missing.size:
+def row_names(given: pd.Series | None, lines: NDArray[np.int64], prefix: str = "") -> pd.Series:
+    """Return the identifiers of pairs; where one has none the line of its row, with a prefix."""
+    # Names as they are given, and lines for the others
+    empty = pd.Series("", index=range(len(lines)), dtype=object)
+    names = empty if given is None else read_texts("pair_id", given)[0]
+    missing = np.flatnonzero(names == "").tolist()
+    if missing:
         names = names.astype(object)
-        numbers = [f"{prefix}row {lines[row]}" for row in missing.tolist()]
-        names.iloc[missing.tolist()] = pd.Index(numbers)
-    return names.set_axis(table.index)
+        names.iloc[missing] = pd.Index([f"{prefix}row {lines[row]}" for row in missing])
+    return names if given is None else names.set_axis(given.index)
 
 
 def check_columns(names: Sequence[str], source: str) -> None:

@@ -417,7 +417,7 @@ class RowLines(NamedTuple):
     #: Line of the file on which each row begins; the header is line 1. Shape (n_rows,).
     numbers: NDArray[np.int64]
     #: Lines between the rows whose quotation marks are wrong.
-    broken: tuple[Rejection, ...]
+    broken: Sequence[Rejection]
 
 
 def row_lines(file: Path, form: TextForm) -> Iterator[RowLines]:
@@ -479,7 +479,8 @@ class _Scanner:
         if '"' not in block and not self._waiting:
             first, self.number = self.number, self.number + block.count("\n")
             return RowLines(block, np.arange(first, self.number), ())
-        lines, at = self._waiting + block.split("\n")[:-1], 0
+        lines = self._waiting + block.split("\n")[:-1]
+        at = 0
         rows, numbers, broken = list[str](), list[int](), list[Rejection]()
         # One row after the other, as far as their lines are here
         while row := self._next(lines[at : at + LONGEST_ROW], is_last):
@@ -493,7 +494,7 @@ class _Scanner:
             self.number += count
         # The others wait for further lines
         self._waiting = lines[at:]
-        return RowLines("".join(rows), np.array(numbers, dtype=np.int64), tuple(broken))
+        return RowLines("".join(rows), np.array(numbers, np.int64), broken)
 
     def _rejection(self, line: str, fault: str) -> Rejection:
         """Return the rejection of the next line."""
