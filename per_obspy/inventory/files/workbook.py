@@ -12,9 +12,9 @@ import re
 import zipfile
 import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date, datetime, time
-from functools import partial, reduce
+from functools import reduce
 from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -105,14 +105,15 @@ def open_workbook(file: Path, given: TableForm) -> Contents:
     source = f"{file}, sheet {sheet.name!r}"
     meanings = meanings_of(sheet.meanings.cells, given, source)
     rows = sheets[sheet.name].slice(sheet.header, MOST_ROWS).select(range(len(meanings.cells)))
-    rows = _computed(source, rows, sheet.header + 1, meanings)
-    # The sheet is named in messages
+    rows, first = _computed(source, rows, sheet.header + 1, meanings), sheet.header + 1
+    lines = np.arange(first, first + len(rows))
+    # The sheet is named in messages, and all of its rows are one block
     header = f" with the header in row {sheet.header}" if sheet.header > 1 else ""
     return Contents(
         source=source,
         meanings=meanings,
         names=[given_text(name.strip()) for name in meanings.names],
-        blocks=partial(_sheet_rows, source, rows, sheet.header + 1),
+        blocks=lambda places: iter([RawRows(source, rows.select(list(places)), lines, ())]),
         form=(f"sheet {sheet.name!r}{header}",),
     )
 
@@ -135,13 +136,6 @@ def _computed(source: str, rows: pa.Table, first: int, meanings: Meanings) -> pa
         mend = "open the workbook in a spreadsheet program and save it"
         raise CatalogError(source, f"{cell}: a formula without a stored value: {mend}")
     return rows
-
-
-def _sheet_rows(
-    source: str, rows: pa.Table, first: int, places: Sequence[int]
-) -> Iterator[RawRows]:
-    """Yield the rows of some columns of a sheet, each with its number in the sheet."""
-    yield RawRows(source, rows.select(list(places)), np.arange(first, first + len(rows)), ())
 
 
 def _pair_sheet(file: Path, sheets: Mapping[str, pa.Table], given: TableForm) -> _Sheet:
