@@ -9,6 +9,7 @@ text goes to the column ``cell_notes``.
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -165,31 +166,29 @@ def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> N
     """
     if is_number(cells) or (name == OBSERVED and pd.api.types.is_bool_dtype(cells.dtype)):
         raw = cells.to_numpy(dtype=np.float64, na_value=np.nan)
-        values = _in_schema(raw, form.units.get(name))
-        return _without(values, np.zeros_like(raw), placeholders(name, raw, values), {})
+        unit = form.units.get(name)
+        numbers = raw if unit is None else raw * unit.numerator / unit.denominator
+        deviations, is_none, notes = np.zeros_like(raw), placeholders(name, raw, numbers), {}
+    else:
+        numbers, deviations, is_none, notes = _numbers_of_texts(name, cells, form)
+    # Numbers that mean nothing are kept aside, as a message may need them
+    lost = {row: float(numbers[row]) for row in np.flatnonzero(is_none).tolist()}
+    return Numbers(np.where(is_none, np.nan, numbers), deviations, notes, lost)
+
+
+def _numbers_of_texts(
+    name: str, cells: pd.Series, form: CellForm
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], dict[int, str]]:
+    """Return numbers, deviations, which numbers mean nothing, and notes of a column of text."""
     # Each text once: a table has few different ones
     codes, texts = pd.factorize(cells.astype(str).mask(cells.isna(), ""))
     if name == "gap" and not form.gap_unit and name not in form.units:
         form = form._replace(gap_unit=unit_in_cells(texts))
     read = [read_number(name, text, form) for text in texts]
     # Back to the rows
-    columns = np.array([(value.number, value.deviation, value.is_placeholder) for value in read])
-    numbers, deviations, is_none = columns.reshape(-1, 3)[codes].T
-    notes = _by_row(codes, [value.note for value in read])
-    return _without(numbers, deviations, is_none > 0.0, notes)
-
-
-def _in_schema(numbers: FloatArray, unit: Unit | None) -> FloatArray:
-    return numbers if unit is None else numbers * unit.numerator / unit.denominator
-
-
-def _without(
-    values: FloatArray, deviations: FloatArray, is_none: NDArray[np.bool_], notes: dict[int, str]
-) -> Numbers:
-    """Return numbers without those that mean nothing."""
-    # These are kept, as a message may need them
-    lost = {row: float(values[row]) for row in np.flatnonzero(is_none).tolist()}
-    return Numbers(np.where(is_none, np.nan, values), deviations, notes, lost)
+    values = [(value.number, value.deviation, value.is_placeholder) for value in read]
+    numbers, deviations, is_none = np.reshape(np.array(values, float), (-1, 3))[codes].T
+    return numbers, deviations, is_none > 0.0, _by_row(codes, [value.note for value in read])
 
 
 def _by_row(codes: NDArray[np.int64], notes: Sequence[str]) -> dict[int, str]:
@@ -233,63 +232,50 @@ def read_number(name: str, text: str, form: CellForm = PLAIN_CELLS) -> Value:
     >>> read_number("storeys_1", "Z+4").number, read_number("damping_1", "5 %").number
     (5.0, 0.05)
     """
-    plain = text.translate(_FULL_WIDTH).strip()
+    text, plain = text.strip(), text.translate(_FULL_WIDTH).strip()
     if is_unknown(plain):
         return Value(np.nan)
-    value = _value(name, text.strip(), plain, form) if len(plain) <= LONGEST else None
-    return value or Value(
-        np.nan, note=f"{name} = {shortened(text.strip(), LONGEST)!r} is not a number"
-    )
-
-
-def _value(name: str, text: str, plain: str, form: CellForm) -> Value | None:
-    """Return the meaning of a text that is not empty, None if it has none."""
-    number = _exact(name, plain, form)
+    number = _exact(name, plain, form) if len(plain) <= LONGEST else None
     if number is None:
-        # Raised digits and fractions are no digits of a number
-        is_odd = any(letter.isnumeric() and not letter.isascii() for letter in plain)
-        return None if is_odd or name != "gap" else _inexact(name, text, plain, form)
+        wrong = f"{name} = {shortened(text, LONGEST)!r} is not a number"
+        return (name == "gap" and _inexact(text, plain, form)) or Value(np.nan, note=wrong)
     # A gap whose unit is in doubt
-    if _lacks_unit(name, plain, number, form):
+    if name == "gap" and _lacks_unit(plain, number, form):
         note = f"{name} = {plain!r} has no unit, as other cells have ({form.gap_unit})"
         return Value(np.nan, note=note)
     # As it is written, without its unit
     digits = _NUMBER.fullmatch(plain)
-    raw = _decimal(digits[1], form.marks.get(name, "")) if digits else None
+    raw = digits and _decimal(digits[1], form.marks.get(name, ""))
     is_none = placeholders(name, np.array([raw or number]), np.array([number]))
     return Value(number, is_placeholder=bool(is_none[0]))
 
 
 def _exact(name: str, text: str, form: CellForm) -> float | None:
     """Return the number that a text is in its column, None if it is none."""
+    # Storeys may be a code, what was observed an answer
+    mark = form.marks.get(name, "")
     if bare_name(name) == "storeys":
-        return _storeys(text, form.language, form.marks.get(name, ""))
+        return _storeys(text, form.language, mark)
     answer = plain_word(text)
     if name == OBSERVED and answer in {**words("yes"), **words("no")}:
         return float(answer in words("yes"))
-    return _quantity(name, text, form)
+    return float(text) if _INFINITE.fullmatch(text) else _quantity(name, text, mark, form)
 
 
-def _lacks_unit(name: str, text: str, number: float, form: CellForm) -> bool:
-    """Return whether a gap has no unit where others have one, and its size does not tell it."""
-    has_unit = bool(re.search(r"[^\d\s.,eE+-]", text))
-    return bool(form.gap_unit) and name == "gap" and number >= DOUBTFUL and not has_unit
-
-
-def unit_in_cells(texts: Iterable[object]) -> str:
-    """Return a unit other than m that texts of gaps have, empty if none has one."""
-    for text in texts:
-        for _, unit in _measures("gap", str(text).translate(_FULL_WIDTH)[: LONGEST + 1]):
-            if unit.name != "m":
-                return unit.name
-    return ""
-
-
-def _measures(name: str, text: str) -> Iterator[tuple[str, Unit]]:
-    """Yield the numbers of a text that have a unit."""
-    for found in re.finditer(rf"({_DIGITS})\s*([^\W\d_]+|['′’\"″”]+)", text, re.ASCII):
-        if unit := unit_of(found[2], name):
-            yield found[1], unit
+def _quantity(name: str, text: str, mark: str, form: CellForm) -> float | None:
+    """Return a number with its unit or that of its column, in the unit of the schema."""
+    # Feet and inches together
+    if unit_of_schema(name) == "m" and (both := _FEET_AND_INCHES.fullmatch(text)):
+        inches = _decimal(both[2], mark)
+        return None if inches is None else float(both[1]) * 0.3048 + inches * 0.0254
+    parts = _NUMBER.fullmatch(text)
+    number = _decimal(parts[1], mark) if parts else None
+    if parts is None or number is None:
+        return None
+    unit = unit_of(parts[2], name) if parts[2] else form.units.get(name)
+    if unit is None:
+        return None if parts[2] else number
+    return number * unit.numerator / unit.denominator
 
 
 def _decimal(text: str, mark: str = "") -> float | None:
@@ -308,46 +294,63 @@ def _decimal(text: str, mark: str = "") -> float | None:
         return None
 
 
-def _quantity(name: str, text: str, form: CellForm) -> float | None:
-    """Return a number with its unit or that of its column, in the unit of the schema."""
-    if _INFINITE.fullmatch(text):
-        return float(text)
-    mark = form.marks.get(name, "")
-    # Feet and inches together
-    if unit_of_schema(name) == "m" and (both := _FEET_AND_INCHES.fullmatch(text)):
-        inches = _decimal(both[2], mark)
-        return None if inches is None else float(both[1]) * 0.3048 + inches * 0.0254
-    found = _NUMBER.fullmatch(text)
-    number = _decimal(found[1], mark) if found else None
-    if found is None or number is None:
-        return None
-    unit = unit_of(found[2], name) if found[2] else form.units.get(name)
-    if unit is None:
-        return None if found[2] else number
-    return number * unit.numerator / unit.denominator
+def _lacks_unit(text: str, number: float, form: CellForm) -> bool:
+    """Return whether a gap has no unit where others have one, and its size does not tell it."""
+    is_doubtful = bool(form.gap_unit) and number >= DOUBTFUL
+    return is_doubtful and not re.search(r"[^\d\s.,eE+-]", text)
 
 
-def _inexact(name: str, text: str, plain: str, form: CellForm) -> Value | None:
+def unit_in_cells(texts: Iterable[object]) -> str:
+    """Return a unit other than m that texts of gaps have, empty if none has one."""
+    plain = (str(text).translate(_FULL_WIDTH)[: LONGEST + 1] for text in texts)
+    units = (unit.name for text in plain for unit in _units(text))
+    return next((name for name in units if name != "m"), "")
+
+
+def _units(text: str) -> Iterator[Unit]:
+    """Yield the units behind the numbers of a gap."""
+    for measure in re.finditer(rf"{_DIGITS}\s*([^\W\d_]+|['′’\"″”]+)", text, re.ASCII):
+        if unit := unit_of(measure[1], "gap"):
+            yield unit
+
+
+def _inexact(text: str, plain: str, form: CellForm) -> Value | None:
     """Return a gap that is a word, a range, an estimate or a limit; None if it is none."""
+    # Raised digits and fractions are no digits of a number
+    is_odd = any(letter.isnumeric() and not letter.isascii() for letter in plain)
+    if is_odd or len(plain) > LONGEST:
+        return None
     word = plain_word(plain.replace("’", "'").replace("(", " ").replace(")", " "))
     if word in words("touching"):
         return Value(0.0)
-    # An estimate or a limit, by the ends of what it may be
+    return _estimate(text, word, form) or _range(text, word, form)
+
+
+def _estimate(text: str, word: str, form: CellForm) -> Value | None:
+    """Return a gap that is an estimate or a limit, by the ends of what it may be."""
     for kind, inner in _limits(word):
-        number = _bound(name, inner, form)
+        number = _bound(inner, form)
         if number is not None and number >= 0.0:
             if kind == "above":
-                return _noted(name, text, number, 0.0, "the least it may be")
-            if kind == "about":
-                return _even(name, text, number * (1.0 - ABOUT), number * (1.0 + ABOUT))
-            return _even(name, text, 0.0, number)
-    # A number with a deviation, or between two
+                return _noted(text, number, 0.0, "the least it may be")
+            about = (number * (1.0 - ABOUT), number * (1.0 + ABOUT))
+            return _even(text, *(about if kind == "about" else (0.0, number)))
+    return None
+
+
+def _range(text: str, word: str, form: CellForm) -> Value | None:
+    """Return a gap with a deviation, or one between two, of which the first may lack the unit."""
     for kind, first, second in _splits(word):
-        ends = _both(name, first, second, form)
-        if ends is not None and kind == "±":
-            return _noted(name, text, *ends, "")
-        if ends is not None and min(ends) >= 0.0:
-            return _even(name, text, *sorted(ends))
+        unit = next(_units(second), None)
+        units = {**form.units, "gap": unit}
+        inner_form = form._replace(units=units, gap_unit="") if unit else form
+        # The unit may be behind both
+        ends = _bound(first, inner_form), _bound(second, form)
+        if ends[0] is not None and ends[1] is not None:
+            if kind == "±":
+                return _noted(text, ends[0], ends[1])
+            if min(ends) >= 0.0:
+                return _even(text, min(ends), max(ends))
     return None
 
 
@@ -377,29 +380,20 @@ def _limits(word: str) -> Iterator[tuple[str, str]]:
                     yield kind, parts[1].strip("() ")
 
 
-def _bound(name: str, text: str, form: CellForm) -> float | None:
+def _bound(text: str, form: CellForm) -> float | None:
     """Return a number of an inexact gap; None where it lacks the unit that other cells have."""
-    number = _quantity(name, text, form)
-    return None if number is None or _lacks_unit(name, text, number, form) else number
+    number = _exact("gap", text, form)
+    return None if number is None or _lacks_unit(text, number, form) else number
 
 
-def _both(name: str, first: str, second: str, form: CellForm) -> tuple[float, float] | None:
-    """Return two numbers, of which the first may have the unit of the second."""
-    # The unit may be behind both
-    unit = next((unit for _, unit in _measures(name, second)), None)
-    inner = form if unit is None else form._replace(units={**form.units, name: unit}, gap_unit="")
-    ends = _bound(name, first, inner), _bound(name, second, form)
-    return None if ends[0] is None or ends[1] is None else (ends[0], ends[1])
-
-
-def _even(name: str, text: str, low: float, high: float) -> Value:
+def _even(text: str, low: float, high: float) -> Value:
     """Return a gap that may as well be anywhere between two."""
-    return _noted(name, text, (low + high) / 2.0, (high - low) * EVEN, "")
+    return _noted(text, (low + high) / 2.0, (high - low) * EVEN)
 
 
-def _noted(name: str, text: str, number: float, deviation: float, why: str) -> Value:
+def _noted(text: str, number: float, deviation: float, why: str = "") -> Value:
     """Return an inexact gap with its note; unknown if its deviation is beyond any gap's."""
-    quoted = f"{name} = {shortened(text, LONGEST)!r}"
+    quoted = f"gap = {shortened(text, LONGEST)!r}"
     if deviation > COLUMNS["gap_std"].high:
         return Value(np.nan, note=f"{quoted} is too wide a range for a gap in m")
     why = why or f"with a deviation of {deviation:.3g} m"
@@ -412,10 +406,15 @@ def _storeys(text: str, language: str, mark: str) -> float | None:
 
     A comma is decimal only before a 0, or before a 5 in a column of decimal commas.
     """
-    word = plain_word(text)
-    parts = [_without_storey(part.strip()) for part in word.split("+")]
-    if found := _STOREYS.fullmatch(parts[0] if len(parts) == 1 else word):
-        return float(found[0].replace(",", ".")) if mark == "," or ",5" not in word else None
+    # Numbers without words for storeys around them
+    word, parts = plain_word(text), list[str]()
+    for part in word.split("+"):
+        bare = part.strip()
+        for sign in words("storey"):
+            bare = bare.removeprefix(sign).removesuffix(sign).strip()
+        parts.append(bare if bare[:1].isdigit() and bare[-1:].isdigit() else part.strip())
+    if number := _STOREYS.fullmatch(parts[0] if len(parts) == 1 else word):
+        return float(number[0].replace(",", ".")) if mark == "," or ",5" not in word else None
     return _floors(parts, language)
 
 
@@ -430,14 +429,6 @@ def _floors(parts: Sequence[str], language: str) -> float | None:
     if len(sure) != 1 or not others <= set(words("basement")) or sure[0] not in parts:
         return None
     return float(parts[-1]) + 1.0 if re.fullmatch(r"\d{1,3}", parts[-1], re.ASCII) else None
-
-
-def _without_storey(part: str) -> str:
-    """Return a number without words for storeys around it, any other text as it is."""
-    bare = part
-    for sign in words("storey"):
-        bare = bare.removeprefix(sign).removesuffix(sign).strip()
-    return bare if bare[:1].isdigit() and bare[-1:].isdigit() else part
 
 
 def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
@@ -460,14 +451,14 @@ def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
         return texts, {}
     # Each text once
     codes, distinct = pd.factorize(texts)
-    choices = {text: _choice(column, text) for text in distinct}
+    choices = [_choice(column, text) for text in distinct]
     allowed = f"is unknown, expected {', '.join(column.choices)}"
     notes = [
         f"{name} = {shortened(text, LONGEST)!r} {allowed}" if choice is None else ""
-        for text, choice in choices.items()
+        for text, choice in zip(distinct, choices, strict=True)
     ]
-    values = texts.map({text: choice or "" for text, choice in choices.items()})
-    return values, _by_row(codes, notes)
+    values = np.array([choice or "" for choice in choices], dtype=object)[codes]
+    return pd.Series(values), _by_row(codes, notes)
 
 
 def _choice(column: Column, text: str) -> str | None:
@@ -510,15 +501,16 @@ def read_columns(
             read[name], wrong = read_texts(name, cells)
             notes.append(wrong)
         else:
-            numbers[name] = read_numbers(name, cells, form)
-            read[name] = pd.Series(_within_half_turn(name, numbers[name].values))
-            notes.append(numbers[name].notes)
+            numbers[name] = column = read_numbers(name, cells, form)
+            read[name] = pd.Series(_within_half_turn(name, column.values))
+            notes.append(column.notes)
     # Values that rest on several columns
-    for group in ONE_OF:
-        notes.append(_without_size(read, numbers, group))
+    notes += [_without_size(read, numbers, group) for group in ONE_OF]
     if "gap" in numbers and (deviations := numbers["gap"].deviations).any():
-        read["gap_std"] = _joined(read.get("gap_std"), deviations)
-    return _with_notes(read, notes)
+        # Independent errors of a gap in the table and in its cell
+        given = read.get("gap_std", pd.Series(deviations * np.nan))
+        read["gap_std"] = given.where(deviations == 0.0, np.hypot(given.fillna(0.0), deviations))
+    return _with_notes(read, notes) if any(notes) else read
 
 
 def _within_half_turn(name: str, values: FloatArray) -> FloatArray:
@@ -528,35 +520,26 @@ def _within_half_turn(name: str, values: FloatArray) -> FloatArray:
     return np.where((values > 180.0) & (values <= 360.0), values - 360.0, values)
 
 
-def _joined(given: pd.Series | None, deviations: FloatArray) -> pd.Series:
-    """Return deviations of gaps, m, with those of inexact cells as independent errors."""
-    exact = pd.Series(np.nan, range(deviations.size)) if given is None else given
-    return exact.where(deviations == 0.0, np.hypot(exact.fillna(0.0), deviations))
-
-
 def _with_notes(
     read: dict[str, pd.Series], notes: Sequence[Mapping[int, str]]
 ) -> dict[str, pd.Series]:
-    """Add the notes of all columns to the column of notes, which tables without one need not."""
-    if not any(notes):
-        return read
-    # Behind those that the table has already
+    """Return columns with the notes of all of them, behind those that the table has already."""
     before = read.get(NOTES, pd.Series("", next(iter(read.values())).index))
     texts = before.astype(object).tolist()
-    for column in notes:
-        for row, note in column.items():
-            texts[row] = f"{texts[row]}; {note}" if texts[row] else note
+    # Column by column
+    for row, note in chain.from_iterable(column.items() for column in notes):
+        texts[row] = f"{texts[row]}; {note}" if texts[row] else note
     return read | {NOTES: pd.Series(texts, dtype=object)}
 
 
 def _without_size(
-    read: dict[str, pd.Series], found: Mapping[str, Numbers], group: tuple[str, ...]
+    read: dict[str, pd.Series], numbers: Mapping[str, Numbers], group: tuple[str, ...]
 ) -> dict[int, str]:
     """Put back the placeholders of buildings that have no other size; return notes of high ones."""
     sizes = [read[name].isna() for name in group if name in read]
-    notes = dict[int, str]()
-    for name in group:
-        for row, number in found[name].placeholders.items() if name in found else ():
+    notes, known = dict[int, str](), [name for name in group if name in numbers]
+    for name in known:
+        for row, number in numbers[name].placeholders.items():
             if not all(size[row] for size in sizes):
                 continue
             # Out of the column's range the number itself is the reason

@@ -6,8 +6,8 @@ Each check works on whole columns. A row with a fault becomes a
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Self
 from unicodedata import category
 
 import numpy as np
@@ -20,10 +20,9 @@ from per_obspy.inventory.cells import NOTES, read_columns, read_texts
 from per_obspy.inventory.quantities import (
     LARGEST_SEPARATION,
     STOREY_HEIGHTS,
-    BuildingRows,
     PairRows,
 )
-from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
+from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column, missing_columns
 from per_obspy.inventory.table_columns import metres_between
 
 #: A contact height may exceed the lower building by this much, m: heights are often rounded,
@@ -88,43 +87,46 @@ def checked_pairs(
         raise CatalogError(source, "the table has no rows")
     if lines is None:
         lines = np.arange(2, len(table) + 2)
-    # Convert every cell and collect every fault of every row
-    pairs, faults = _converted(table.assign(pair_id=row_names(table, lines)))
-    identifiers = pairs["pair_id"]
-    faults += _duplicates(identifiers, identifiers.duplicated() if repeated is None else repeated)
+    # Every fault of every row: of cells, of names, and of values beside others
+    pairs, faults = _converted(table.assign(pair_id=row_names(table.get("pair_id"), lines)))
+    # Names of earlier rows, and values that contradict each other or the world
+    names, rows = pairs["pair_id"], PairRows(pairs)
+    again = (names.duplicated() if repeated is None else repeated) & (names != "")
+    faults += [
+        (i, f"pair_id = {names.iloc[i]!r} occurs in an earlier row already") for i in _rows(again)
+    ]
     with np.errstate(all="ignore"):
-        faults += _impossible(PairRows(pairs))
-    # Separate the rows without a fault from the rejected ones
-    rejected = _rejections(identifiers, faults, source, lines)
-    is_faulty = np.zeros(len(pairs), dtype=bool)
-    is_faulty[[position for position, _ in faults]] = True
-    accepted = pairs[~is_faulty].reset_index(drop=True)
-    accepted.attrs["rejected"] = Rejections(rejected)
+        for check in (_impossible_sizes, _impossible_contacts, _impossible_places):
+            faults += check(rows)
+    return _accepted(pairs, faults, source, lines)
+
+
+def _accepted(
+    pairs: pd.DataFrame, faults: Iterable[Fault], source: str, lines: NDArray[np.int64]
+) -> pd.DataFrame:
+    """Return the rows without a fault, with a rejection of each other row and all its reasons."""
+    reasons: dict[int, list[str]] = defaultdict(list)
+    for position, reason in faults:
+        reasons[position].append(reason)
+    bad, names = sorted(reasons), pairs["pair_id"]
+    # Both in the order of the table
+    accepted = pairs.drop(index=bad).reset_index(drop=True)
+    accepted.attrs["rejected"] = Rejections(
+        Rejection("pair", names.iloc[i], source, int(lines[i]), tuple(reasons[i])) for i in bad
+    )
     return accepted
 
 
-def row_names(table: pd.DataFrame, lines: NDArray[np.int64], prefix: str = "") -> pd.Series:
-    """
-    Return the identifiers of pairs, the number of its row where a pair has none.
-
-    Parameters
-    ----------
-    table : DataFrame
-        With or without the column ``pair_id``.
-    lines : (n_rows,) ndarray of int
-        Line of each row in its file.
-    prefix : str, optional
-        What names the file, where an inventory has several.
-    """
-    # Names as they are given, and numbers for the others
-    empty = pd.Series("", index=range(len(table)), dtype=object)
-    names = read_texts("pair_id", table["pair_id"])[0] if "pair_id" in table else empty
-    missing = np.flatnonzero(names == "")
-    if missing.size:
+def row_names(given: pd.Series | None, lines: NDArray[np.int64], prefix: str = "") -> pd.Series:
+    """Return the identifiers of pairs; where one has none the line of its row, with a prefix."""
+    # Names as they are given, and lines for the others
+    empty = pd.Series("", index=range(len(lines)), dtype=object)
+    names = empty if given is None else read_texts("pair_id", given)[0]
+    missing = np.flatnonzero(names == "").tolist()
+    if missing:
         names = names.astype(object)
-        numbers = [f"{prefix}row {lines[row]}" for row in missing.tolist()]
-        names.iloc[missing.tolist()] = pd.Index(numbers)
-    return names.set_axis(table.index)
+        names.iloc[missing] = pd.Index([f"{prefix}row {lines[row]}" for row in missing])
+    return names if given is None else names.set_axis(given.index)
 
 
 def check_columns(names: Sequence[str], source: str) -> None:
@@ -137,17 +139,12 @@ def check_columns(names: Sequence[str], source: str) -> None:
         If a required column is missing or a column occurs twice.
     """
     _check_names(names, source)
-    # Required columns, and groups of which one column is enough
-    required = [column.name for column in COLUMNS.values() if column.required]
-    missing = [name for name in required if name not in names]
-    missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
-    if missing:
+    # Of groups one column is enough
+    if missing := [" or ".join(group) for group in missing_columns(names)]:
         found = ", ".join(names) or "none"
         suggestion = did_you_mean(missing[0], set(names) - set(COLUMNS))
-        absent = ", ".join(missing)
-        raise CatalogError(
-            source, f"missing column {absent} (columns found: {found:.200}){suggestion}"
-        )
+        absent = f"missing column {', '.join(missing)}"
+        raise CatalogError(source, f"{absent} (columns found: {found:.200}){suggestion}")
 
 
 def _check_names(names: Sequence[str], source: str) -> None:
@@ -222,63 +219,63 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
     return faults
 
 
-def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
-    """Yield rows whose ``pair_id`` an earlier row has."""
-    for i in _rows(np.asarray(repeated) & (identifiers != "").to_numpy()):
-        yield i, f"pair_id = {identifiers.iloc[i]!r} occurs in an earlier row already"
+def _impossible_sizes(pair: PairRows) -> Iterator[Fault]:
+    """Yield rows whose sizes are missing, or contradict each other."""
+    # Of each building one size is needed
+    for names in ONE_OF:
+        for i in _rows(pair.table.reindex(columns=names).isna().all(axis=1)):
+            notes = _noted(pair.table, i, names)
+            reason = f"none of {', '.join(names)} is a number, one is needed"
+            yield i, f"{reason}: {notes}" if notes else reason
+    # Floors are neither lower than doors nor higher than halls
+    low, high = STOREY_HEIGHTS
+    for one in pair.buildings:
+        height, storeys, k = one.height, one.storeys, one.suffix
+        is_wrong = (one.storey < low) | (one.storey > high)
+        for i in _rows((height > 0.0) & (storeys > 0.0) & is_wrong):
+            sizes = f"height{k} = {height[i]:g} m with storeys{k} = {storeys[i]:g}"
+            floors = f"floors of {one.storey[i]:.3g} m, outside {low:g} to {high:g} m"
+            yield i, f"{sizes} makes {floors}"
 
 
-class _Check(NamedTuple):
-    """
-    Rows that are impossible, and why.
-
-    A reason is text with numbers of the row in braces and # for the building, or makes the text.
-    """
-
-    is_wrong: Callable[[Any], NDArray[np.bool_]]
-    reason: str | Callable[[Any, int], str]
-    of_buildings: bool = False
-
-
-class _Numbers(dict[str, float]):
-    """Numbers of a row by name."""
-
-    def __init__(self, rows: PairRows | BuildingRows, row: int) -> None:
-        super().__init__()
-        self._rows, self._row = rows, row
-
-    def __missing__(self, name: str) -> float:
-        return float(getattr(self._rows, name)[self._row])
+def _impossible_contacts(pair: PairRows) -> Iterator[Fault]:
+    """Yield rows whose contact or floors contradict the buildings."""
+    contact, roof, storey = pair.contact_height, pair.lower_roof, pair.storey
+    for i in _rows(contact > roof + CONTACT_TOLERANCE):
+        where = f"above the lower building, {roof[i]:g} m"
+        yield i, f"contact_height = {contact[i]:g} m is {where}"
+    # The nearest floor
+    offset = np.abs(pair.floor_offset)
+    for i in _rows(offset > storey):
+        yield i, f"floor_offset = {offset[i]:g} m is larger than a storey, {storey[i]:.3g} m"
 
 
-def _impossible(pair: PairRows) -> Iterator[Fault]:
-    """Yield rows with values that contradict each other or the world."""
-    for check in _CHECKS:
-        for rows in pair.buildings if check.of_buildings else (pair,):
-            for i in _rows(check.is_wrong(rows)):
-                if isinstance(check.reason, str):
-                    reason = check.reason.replace("_#", rows.suffix)
-                    yield i, reason.format_map(_Numbers(rows, i))
-                else:
-                    yield i, check.reason(rows, i)
-
-
-def _without_size(one: BuildingRows, i: int) -> str:
-    """Return that a row has a building without size, with the notes on its cells."""
-    group = [f"{name}{one.suffix}" for name in ("height", "storeys", "period")]
-    notes = _noted(one.table, i, group)
-    reason = f"none of {', '.join(group)} is a number, one is needed"
-    return f"{reason}: {notes}" if notes else reason
+def _impossible_places(pair: PairRows) -> Iterator[Fault]:
+    """Yield rows of no two neighbours, and those in which pounding is seen in part."""
+    # Many programs write 0 for a missing position
+    for one in pair.buildings:
+        for i in _rows((one.longitude == 0.0) & (one.latitude == 0.0)):
+            names = f"longitude{one.suffix} = latitude{one.suffix}"
+            yield i, f"{names} = 0 is a placeholder, not a position"
+    for i in _rows(pair.separation > LARGEST_SEPARATION):
+        yield i, _too_far(pair, i)
+    # A building beside itself
+    if pair.has("building_id_1") and pair.has("building_id_2"):
+        name = pair.table["building_id_1"]
+        for i in _rows((name == pair.table["building_id_2"]) & (name != "")):
+            names = f"building_id_1 = building_id_2 = {name.iloc[i]!r}"
+            yield i, f"{names}: a building has no gap to itself"
+    for i in _rows((pair.observed > 0.0) & (pair.observed < 1.0)):
+        yield i, f"observed = {pair.observed[i]:g} is neither 0 nor 1"
 
 
 def _too_far(pair: PairRows, i: int) -> str:
     """Return why positions lie too far from each other, with the usual mistake that explains it."""
     first, second = ((float(one.longitude[i]), float(one.latitude[i])) for one in pair.buildings)
-    places = [
+    places = " and ".join(
         f"(longitude_{k} = {place[0]:g}, latitude_{k} = {place[1]:g})"
         for k, place in enumerate((first, second), 1)
-    ]
-    apart = f"{pair.separation[i] / 1000:.3g} km apart"
+    )
     # Positions of the second building as they may be meant
     east, north = second
     other_ways = {
@@ -293,74 +290,5 @@ def _too_far(pair: PairRows, i: int) -> str:
         for way, meant in other_ways.items()
         if np.hypot(*metres_between(*first, *meant)) <= LARGEST_SEPARATION
     )
-    return f"the positions {' and '.join(places)} are {apart}{next(near, '')}"
-
-
-def _is_same_building(pair: PairRows) -> NDArray[np.bool_]:
-    """Return rows that name the same building twice."""
-    if not (pair.has("building_id_1") and pair.has("building_id_2")):
-        return np.zeros(len(pair.table), dtype=bool)
-    first = pair.table["building_id_1"]
-    return ((first == pair.table["building_id_2"]) & (first != "")).to_numpy(dtype=bool)
-
-
-_CHECKS = (
-    _Check(
-        lambda one: np.isnan(one.height) & np.isnan(one.storeys) & np.isnan(one.period),
-        _without_size,
-        of_buildings=True,
-    ),
-    _Check(
-        lambda one: (
-            (one.height > 0.0) & (one.storeys > 0.0)
-            & ((one.storey < STOREY_HEIGHTS[0]) | (one.storey > STOREY_HEIGHTS[1]))
-        ),
-        "height_# = {height:g} m with storeys_# = {storeys:g} makes floors of {storey:.3g} m, "
-        f"outside {STOREY_HEIGHTS[0]:g} to {STOREY_HEIGHTS[1]:g} m",
-        of_buildings=True,
-    ),
-    _Check(
-        lambda pair: pair.contact_height > pair.lower_roof + CONTACT_TOLERANCE,
-        "contact_height = {contact_height:g} m is above the lower building, {lower_roof:g} m",
-    ),
-    _Check(
-        lambda pair: np.abs(pair.floor_offset) > pair.storey,
-        lambda pair, i: (
-            f"floor_offset = {abs(pair.floor_offset[i]):g} m is larger than a storey, "
-            f"{pair.storey[i]:.3g} m"
-        ),
-    ),
-    # Many programs write 0 for a missing position
-    _Check(
-        lambda one: (one.longitude == 0.0) & (one.latitude == 0.0),
-        "longitude_# = latitude_# = 0 is a placeholder, not a position",
-        of_buildings=True,
-    ),
-    _Check(lambda pair: pair.separation > LARGEST_SEPARATION, _too_far),
-    _Check(
-        _is_same_building,
-        lambda pair, i: (
-            f"building_id_1 = building_id_2 = {pair.table['building_id_1'].iloc[i]!r}: "
-            "a building has no gap to itself"
-        ),
-    ),
-    _Check(
-        lambda pair: (pair.observed > 0.0) & (pair.observed < 1.0),
-        "observed = {observed:g} is neither 0 nor 1",
-    ),
-)  # fmt: skip
-
-
-def _rejections(
-    identifiers: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]
-) -> tuple[Rejection, ...]:
-    """Return one rejection per faulty row, with its reasons in the order of the checks."""
-    reasons: dict[int, list[str]] = defaultdict(list)
-    for position, reason in faults:
-        reasons[int(position)].append(reason)
-    # Rows in the order of the table
-    rejected = []
-    for i in sorted(reasons):
-        line = int(lines[i])
-        rejected.append(Rejection("pair", identifiers.iloc[i], source, line, tuple(reasons[i])))
-    return tuple(rejected)
+    apart = f"{pair.separation[i] / 1000:.3g} km apart"
+    return f"the positions {places} are {apart}{next(near, '')}"

@@ -70,27 +70,33 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
       where the table gives ``height_log_std``. A derived period has the height's deviation too.
     * A height with a deviation is an estimate and counts as derived.
     """
-    table = _Completion(pairs, building)
+    table = _Columns(pairs)
+    # Masonry and anything unknown
+    systems = {}
     for i in (1, 2):
-        table.add_building(i)
-    table.add_contact()
-    table.add_gap()
+        system = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
+        table.derived[f"system_{i}"] = (system == "").to_numpy(dtype=bool)
+        systems[f"system_{i}"] = system.where(system != "", "other")
+    # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
-        table.add_mass(i)
-    table.add_place()
-    # Texts and flags
-    columns, derived = table.columns, table.derived
-    offset = np.nan_to_num(columns["floor_offset"])
+        _add_size(table, i, building)
+        _add_period(table, i, building, systems[f"system_{i}"].to_numpy(dtype=str))
+        _add_strength(table, i)
+    _add_contact(table, building)
+    _add_gap(table, building)
+    for i in (1, 2):
+        _add_mass(table, i, building)
+    _add_place(table)
+    offset = np.nan_to_num(table.columns["floor_offset"])
     return pairs.assign(
-        **columns,
-        system_1=table.systems[1],
-        system_2=table.systems[2],
-        derived=joined_names(derived),
+        **table.columns,
+        **systems,
+        derived=joined_names(table.derived),
         floors_misaligned=floors_misaligned(offset, building.floor_tolerance),
     )
 
 
-class _Completion:
+class _Columns:
     """
     Columns of a pair table as far as they are complete.
 
@@ -100,21 +106,12 @@ class _Completion:
         Completed columns by name.
     derived : dict
         Column that may be derived -> mask of the derived rows.
-    systems : dict
-        Building -> its structural systems, ``other`` where the table has none.
     """
 
-    def __init__(self, pairs: pd.DataFrame, building: config.Building) -> None:
-        self.pairs, self.building = pairs, building
+    def __init__(self, pairs: pd.DataFrame) -> None:
+        self.pairs = pairs
         self.columns: dict[str, FloatArray] = {}
         self.derived: dict[str, NDArray[np.bool_]] = {}
-        self.systems: dict[int, pd.Series] = {}
-        # Masonry and anything unknown
-        empty = pd.Series("", index=pairs.index)
-        for i in (1, 2):
-            system = pairs.get(name := f"system_{i}", empty)
-            self.derived[name] = (system == "").to_numpy(dtype=bool)
-            self.systems[i] = system.where(system != "", "other")
 
     def given(self, name: str, otherwise: FloatArray | float = np.nan) -> FloatArray:
         """Return the given values of a column, and other values where there are none."""
@@ -123,128 +120,119 @@ class _Completion:
 
     def fill(self, name: str, values: FloatArray | float) -> FloatArray:
         """Add a column of given values, filled up by others; the filled rows count as derived."""
-        columns, derived = self.columns, self.derived
-        columns[name] = self.given(name, values)
-        derived[name] = np.isnan(self.given(name)) & ~np.isnan(columns[name])
-        return columns[name]
+        self.columns[name] = self.given(name, values)
+        is_missing = np.isnan(numbers_in(self.pairs, name))
+        self.derived[name] = is_missing & ~np.isnan(self.columns[name])
+        return self.columns[name]
 
-    def add_building(self, i: int) -> None:
-        """Add size, period, damping and strength of building i."""
-        given, building = self.given, self.building
-        # Height, m, and storeys, each from the other by the storey height
-        counted = np.maximum(np.rint(given(f"height_{i}") / building.storey_height), 1.0)
-        height = self.fill(f"height_{i}", given(f"storeys_{i}") * building.storey_height)
-        self.fill(f"storeys_{i}", counted)
-        # Deviation of the storeys and of the height of a storey
-        is_counted, spread = self.derived[f"height_{i}"], given(f"height_log_std_{i}", 0.0)
-        self.derived[f"height_{i}"] = (is_counted | (spread > 0.0)) & ~np.isnan(height)
-        spread = np.where(is_counted, np.hypot(spread, building.storey_height_log_std), spread)
-        self.columns[f"height_log_std_{i}"] = spread
-        self._add_period(i, spread)
-        self._add_strength(i)
+    def storeys(self, i: int) -> FloatArray:
+        """Return the storeys of building i, NaN where its height is unknown."""
+        return np.where(np.isnan(self.columns[f"height_{i}"]), np.nan, self.columns[f"storeys_{i}"])
 
-    def _add_period(self, i: int, height_log_std: FloatArray) -> None:
-        """Add period, s, and damping of building i with their logarithmic standard deviations."""
-        system, building = self.systems[i].to_numpy(dtype=str), self.building
-        # A row without height has a period, or it would have been rejected: 1 m is a placeholder
-        height = self.columns[f"height_{i}"]
-        known, formula = ~np.isnan(height), _FORMULAS[building.period_formula]
-        period = np.where(known, formula(np.where(known, height, 1.0), system), np.nan)
-        # Damping as a fraction of critical
-        assumed: dict[str, tuple[FloatArray | float, FloatArray | float]] = {
-            "period": (period, period_log_std(system, height_log_std)),
-            "damping": (building.damping, building.damping_log_std),
-        }
-        for name, (value, deviation) in assumed.items():
-            spread = np.where(np.isnan(self.given(f"{name}_{i}")), deviation, 0.0)
-            self.fill(f"{name}_{i}", value)
-            self.columns[f"{name}_log_std_{i}"] = self.given(f"{name}_log_std_{i}", spread)
 
-    def _add_strength(self, i: int) -> None:
-        """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
-        # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
-        share = effective_mass_ratio(self._storeys(i))
-        coefficient = self.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
-        radius = (self.columns[f"period_{i}"] / 2 / np.pi) ** 2
-        strength = self.fill(f"yield_displacement_{i}", coefficient * radius)
-        self.columns[f"yield_displacement_{i}"] = np.where(np.isnan(strength), np.inf, strength)
-        self.columns[f"hardening_{i}"] = self.given(f"hardening_{i}", 0.0)
+def _add_size(table: _Columns, i: int, building: config.Building) -> None:
+    """Add height, m, and storeys of building i, each from the other by the storey height."""
+    counted = np.maximum(np.rint(table.given(f"height_{i}") / building.storey_height), 1.0)
+    height = table.fill(f"height_{i}", table.given(f"storeys_{i}") * building.storey_height)
+    table.fill(f"storeys_{i}", counted)
+    # Deviation of the storeys and of the height of a storey
+    is_counted, spread = table.derived[f"height_{i}"], table.given(f"height_log_std_{i}", 0.0)
+    table.derived[f"height_{i}"] = (is_counted | (spread > 0.0)) & ~np.isnan(height)
+    spread = np.where(is_counted, np.hypot(spread, building.storey_height_log_std), spread)
+    table.columns[f"height_log_std_{i}"] = spread
 
-    def _storeys(self, i: int) -> FloatArray:
-        """Return the storeys of building i, 1 where its size is unknown."""
-        return np.where(np.isnan(self.columns[f"height_{i}"]), 1.0, self.columns[f"storeys_{i}"])
 
-    def _size(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return storeys, height and contact height, m, of building i; 1 where unknown."""
-        height = self.columns[f"height_{i}"]
-        contact = np.fmin(self.columns["contact_height"], height)
-        unknown = np.isnan(height)
-        return self._storeys(i), np.where(unknown, 1.0, height), np.where(unknown, 1.0, contact)
+def _add_period(
+    table: _Columns, i: int, building: config.Building, system: NDArray[np.str_]
+) -> None:
+    """Add period, s, and damping of building i with their logarithmic standard deviations."""
+    # A row without height has a period, or it would have been rejected: 1 m is a placeholder
+    height, formula = table.columns[f"height_{i}"], _FORMULAS[building.period_formula]
+    known = ~np.isnan(height)
+    period = np.where(known, formula(np.where(known, height, 1.0), system), np.nan)
+    scatter = period_log_std(system, table.columns[f"height_log_std_{i}"])
+    # Damping as a fraction of critical
+    assumed: dict[str, tuple[FloatArray | float, FloatArray | float]] = {
+        "period": (period, scatter),
+        "damping": (building.damping, building.damping_log_std),
+    }
+    for name, (value, deviation) in assumed.items():
+        spread = np.where(np.isnan(table.given(f"{name}_{i}")), deviation, 0.0)
+        table.fill(f"{name}_{i}", value)
+        table.columns[f"{name}_log_std_{i}"] = table.given(f"{name}_log_std_{i}", spread)
 
-    def add_contact(self) -> None:
-        """Add contact height, participations at it, floor offset and restitution."""
-        columns = self.columns
-        # Contact at the top of the lower building whose height is known
-        lower = np.fmin(columns["height_1"], columns["height_2"])
-        contact = self.fill("contact_height", lower)
-        # Also where the table has taken it from an estimated height
-        deviation = np.fmax(columns["height_log_std_1"], columns["height_log_std_2"])
-        self.derived["contact_height"] |= (deviation > 0.0) & (contact == lower)
-        # A plain oscillator where the height is unknown
-        for i in (1, 2):
-            known = ~np.isnan(columns[f"height_{i}"])
-            participation = contact_participation(*self._size(i))
-            self.fill(f"participation_{i}", np.where(known, participation, 1.0))
-        self._add_floor_offset()
-        self.fill("restitution", self.building.restitution)
 
-    def _add_floor_offset(self) -> None:
-        """Add the floor offset, m; NaN unless heights and storeys of both buildings are given."""
-        # Of floors that are equally high within a building
-        given = [self.given(f"{name}_{i}") for name in ("height", "storeys") for i in (1, 2)]
-        (storeys_1, height_1, _), (storeys_2, height_2, _) = self._size(1), self._size(2)
-        offset = floor_offset(height_1, storeys_1, height_2, storeys_2)
-        self.fill("floor_offset", np.where(np.isnan(given).any(axis=0), np.nan, offset))
+def _add_strength(table: _Columns, i: int) -> None:
+    """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
+    # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
+    share = np.nan_to_num(effective_mass_ratio(table.storeys(i)), nan=1.0)
+    coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
+    radius = (table.columns[f"period_{i}"] / 2 / np.pi) ** 2
+    strength = table.fill(f"yield_displacement_{i}", coefficient * radius)
+    table.columns[f"yield_displacement_{i}"] = np.where(np.isnan(strength), np.inf, strength)
+    table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", 0.0)
 
-    def add_place(self) -> None:
-        """Add the middle of the pair, across the date line too, and the azimuth."""
-        given, columns = self.given, self.columns
-        # On the shorter way around the Earth
-        east = (given("longitude_2") - given("longitude_1") + 180.0) % 360.0 - 180.0
-        columns["longitude"] = (given("longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
-        columns["latitude"] = (given("latitude_1") + given("latitude_2")) / 2.0
-        columns["azimuth"] = given("azimuth")
 
-    def add_mass(self, i: int) -> None:
-        """Add total mass and generalised mass at the contact, kg, of building i."""
-        # A mass that is not known is the neighbour's; where neither is, that of one storey
-        mass, neighbour = self._mass_by_area(i), self._mass_by_area(3 - i)
-        assumed = np.where(np.isnan(mass), neighbour, mass)
-        one_storey = self.building.area * self.building.mass_per_area
-        mass = self.fill(f"mass_{i}", np.where(np.isnan(assumed), one_storey, assumed))
-        # The whole mass where the height of the contact is unknown
-        known = ~np.isnan(self.columns[f"height_{i}"])
-        at_contact = contact_mass(mass, *self._size(i))
-        self.columns[f"contact_mass_{i}"] = np.where(known, at_contact, mass)
+def _add_contact(table: _Columns, building: config.Building) -> None:
+    """Add contact height, participations at it, floor offset and restitution."""
+    columns = table.columns
+    # Contact at the top of the lower building whose height is known
+    lower = np.fmin(columns["height_1"], columns["height_2"])
+    contact = table.fill("contact_height", lower)
+    # Also where the table has taken it from an estimated height
+    deviation = np.fmax(columns["height_log_std_1"], columns["height_log_std_2"])
+    table.derived["contact_height"] |= (deviation > 0.0) & (contact == lower)
+    # A plain oscillator where the height is unknown
+    for i in (1, 2):
+        height = columns[f"height_{i}"]
+        share = contact_participation(table.storeys(i), height, np.minimum(contact, height))
+        table.fill(f"participation_{i}", np.nan_to_num(share, nan=1.0))
+    # Of floors that are equally high within a building, where all is given
+    sizes = [table.given(f"{name}_{i}") for i in (1, 2) for name in ("height", "storeys")]
+    offset = np.where(np.isnan(sizes).any(axis=0), np.nan, floor_offset(*sizes))
+    table.fill("floor_offset", offset)
+    table.fill("restitution", building.restitution)
 
-    def _mass_by_area(self, i: int) -> FloatArray:
-        """Return masses of building i, kg: given, or from area and storeys; NaN if unknown."""
-        area = self.given(f"area_{i}", self.building.area)
-        mass = area * self.columns[f"storeys_{i}"] * self.building.mass_per_area
-        return self.given(f"mass_{i}", mass)
 
-    def add_gap(self) -> None:
-        """Add gap and its deviation, m: those of the assumed lognormal gap where it is unknown."""
-        deviation, building = self.given("gap_std", 0.0), self.building
-        # A deviation may be a default of the command that made the table
-        if "gap_std_source" in self.pairs:
-            is_assumed = self.pairs["gap_std_source"] == "assumed"
-            self.derived["gap_std"] = is_assumed.to_numpy(dtype=bool)
-        self.columns["gap"], self.columns["gap_std"] = self.given("gap"), deviation
-        if building.gap is not None:
-            # Mean and standard deviation of the lognormal distribution
-            variance = building.gap_log_std**2
-            mean = building.gap * np.exp(variance / 2.0)
-            self.fill("gap", mean)
-            spread = mean * np.sqrt(np.expm1(variance))
-            self.columns["gap_std"] = np.where(self.derived["gap"], spread, deviation)
+def _add_gap(table: _Columns, building: config.Building) -> None:
+    """Add gap and its deviation, m: those of the assumed lognormal gap where it is unknown."""
+    deviation = table.given("gap_std", 0.0)
+    # A deviation may be a default of the command that made the table
+    if "gap_std_source" in table.pairs:
+        is_assumed = table.pairs["gap_std_source"] == "assumed"
+        table.derived["gap_std"] = is_assumed.to_numpy(dtype=bool)
+    table.columns["gap"], table.columns["gap_std"] = table.given("gap"), deviation
+    if building.gap is not None:
+        # Mean and standard deviation of the lognormal distribution
+        variance = building.gap_log_std**2
+        mean = building.gap * np.exp(variance / 2.0)
+        table.fill("gap", mean)
+        spread = mean * np.sqrt(np.expm1(variance))
+        table.columns["gap_std"] = np.where(table.derived["gap"], spread, deviation)
+
+
+def _add_mass(table: _Columns, i: int, building: config.Building) -> None:
+    """Add total mass and generalised mass at the contact, kg, of building i."""
+    columns = table.columns
+    # A mass that is not known is the neighbour's; where neither is, that of one storey
+    assumed: FloatArray | float = building.area * building.mass_per_area
+    for k in (3 - i, i):
+        area = table.given(f"area_{k}", building.area)
+        mass = table.given(f"mass_{k}", area * columns[f"storeys_{k}"] * building.mass_per_area)
+        assumed = np.where(np.isnan(mass), assumed, mass)
+    mass = table.fill(f"mass_{i}", assumed)
+    # The whole mass where the height of the contact is unknown
+    height = columns[f"height_{i}"]
+    contact = np.minimum(columns["contact_height"], height)
+    at_contact = contact_mass(mass, table.storeys(i), height, contact)
+    columns[f"contact_mass_{i}"] = np.where(np.isnan(height), mass, at_contact)
+
+
+def _add_place(table: _Columns) -> None:
+    """Add the middle of the pair, across the date line too, and the azimuth."""
+    given, columns = table.given, table.columns
+    # On the shorter way around the Earth
+    east = (given("longitude_2") - given("longitude_1") + 180.0) % 360.0 - 180.0
+    columns["longitude"] = (given("longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
+    columns["latitude"] = (given("latitude_1") + given("latitude_2")) / 2.0
+    columns["azimuth"] = given("azimuth")

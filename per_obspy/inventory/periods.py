@@ -7,6 +7,8 @@ functions here return medians (best fits) where the literature has them, and eac
 logarithmic standard deviation, ``period_log_std``.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,57 +16,33 @@ from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.inventory.schema import SYSTEMS
 
-#: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);
-#: ASCE 7, table 12.8-2, metric. The two ratios are those of Goel & Chopra (1997). No best fit is
-#: known for the other systems: their lower bound is used as a median, unverified. Buildings with
-#: concrete walls are among ASCE 7's "all other structural systems".
-ASCE7 = {
-    "steel_mrf": (1.25, 0.0724, 0.80),
-    "concrete_mrf": (1.13, 0.0466, 0.90),
-    "concrete_frame_wall": (1.0, 0.0488, 0.75),
-    "concrete_wall": (1.0, 0.0488, 0.75),
-    "ebf_brbf": (1.0, 0.0731, 0.75),
-    "other": (1.0, 0.0488, 0.75),
-}
-
-#: system -> C_t of EN 1998-1, eq. (4.6), for buildings up to EC8_HEIGHT.
-EC8 = {
-    "steel_mrf": 0.085,
-    "concrete_mrf": 0.075,
-    "concrete_frame_wall": 0.050,
-    "concrete_wall": 0.050,
-    "ebf_brbf": 0.075,
-    "other": 0.050,
+#: system -> best fit / lower bound, coefficient of the lower bound in s/m**exponent and exponent of
+#: ASCE 7, table 12.8-2, metric; C_t of EN 1998-1, eq. (4.6), for buildings up to EC8_HEIGHT;
+#: logarithmic standard deviation of a period by either formula. The two ratios are those of Goel &
+#: Chopra (1997). No best fit is known for the other systems: their lower bound is used as a median,
+#: unverified. Buildings with concrete walls are among ASCE 7's "all other structural systems". The
+#: deviation is 0.4 for masonry, unknown systems, and walls, whose period depends on their area more
+#: than on the height.
+_COEFFICIENTS = {
+    "steel_mrf": (1.25, 0.0724, 0.80, 0.085, 0.3),
+    "concrete_mrf": (1.13, 0.0466, 0.90, 0.075, 0.3),
+    "concrete_frame_wall": (1.0, 0.0488, 0.75, 0.050, 0.4),
+    "concrete_wall": (1.0, 0.0488, 0.75, 0.050, 0.4),
+    "ebf_brbf": (1.0, 0.0731, 0.75, 0.075, 0.3),
+    "other": (1.0, 0.0488, 0.75, 0.050, 0.4),
 }
 EC8_HEIGHT = 40.0
 
-#: Logarithmic standard deviation of a period derived by either formula: 0.4 for masonry, unknown
-#: systems, and walls, whose period depends on their area more than on the height.
-LOG_STD = {
-    "steel_mrf": 0.3,
-    "concrete_mrf": 0.3,
-    "concrete_frame_wall": 0.4,
-    "concrete_wall": 0.4,
-    "ebf_brbf": 0.3,
-    "other": 0.4,
-}
 
-
-def _checked_systems(system: ArrayLike) -> NDArray[np.str_]:
-    """Return structural systems as an array; raise ValueError if one is unknown."""
+def _coefficients(system: ArrayLike) -> NDArray[Any]:
+    """Return the five coefficients of structural systems, (5, ...); ValueError if one is none."""
     names = np.asarray(system, dtype=str)
-    unknown = sorted(set(np.unique(names).tolist()) - set(SYSTEMS))
-    if unknown:
-        raise ValueError(f"system must be one of {', '.join(SYSTEMS)}, got {unknown[0]!r}")
-    return names
-
-
-def _by_system(names: NDArray[np.str_], values: dict[str, float]) -> FloatArray:
-    """Return the value of each building's structural system."""
-    chosen = np.empty(names.shape)
-    for name, value in values.items():
-        chosen[names == name] = value
-    return chosen
+    is_system = names[..., None] == np.array(SYSTEMS)
+    unknown = names[~is_system.any(axis=-1)]
+    if unknown.size:
+        raise ValueError(f"system must be one of {', '.join(SYSTEMS)}, got {str(min(unknown))!r}")
+    # A row of the table for each name
+    return np.moveaxis(is_system @ np.array([_COEFFICIENTS[name] for name in SYSTEMS]), -1, 0)
 
 
 def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
@@ -101,11 +79,9 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     >>> asce7_period([10.0, 30.0], "concrete_mrf").round(2)
     array([0.42, 1.12])
     """
-    names, metres = np.broadcast_arrays(_checked_systems(system), checks.positive("height", height))
+    ratio, coefficient, exponent, *_ = _coefficients(system)
     # Median = best fit over lower bound, times the code's lower bound
-    factors = {name: ratio * coefficient for name, (ratio, coefficient, _) in ASCE7.items()}
-    exponents = {name: exponent for name, (_, _, exponent) in ASCE7.items()}
-    period: FloatArray = _by_system(names, factors) * metres ** _by_system(names, exponents)
+    period: FloatArray = ratio * coefficient * checks.positive("height", height) ** exponent
     return period
 
 
@@ -142,38 +118,21 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     >>> float(ec8_period(16.0, "concrete_mrf").round(2))
     0.6
     """
-    names, metres = np.broadcast_arrays(_checked_systems(system), checks.positive("height", height))
-    low = _by_system(names, EC8) * metres**0.75
-    period: FloatArray = np.where(metres <= EC8_HEIGHT, low, asce7_period(metres, names))
-    return period
+    metres = checks.positive("height", height)
+    low = _coefficients(system)[3] * metres**0.75
+    return np.where(metres <= EC8_HEIGHT, low, asce7_period(metres, system))
 
 
 def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatArray:
     """
-    Return the logarithmic standard deviation of a derived period.
+    Return the logarithmic standard deviation of a derived period: the root of both squares.
 
-    Parameters
-    ----------
-    system : array_like of str
-        One of ``SYSTEMS``: 0.3, or 0.4 for walls and ``other``, where the height is exact.
-    height_log_std : array_like, optional
-        Logarithmic standard deviation of the height, which the period has by the exponent of
-        ASCE 7; that of Eurocode 8 is not larger.
-
-    Returns
-    -------
-    deviation : ndarray
-        Root of the sum of both squares.
+    That of the height comes with the exponent of ASCE 7; that of Eurocode 8 is not larger.
 
     Examples
     --------
     >>> period_log_std("concrete_mrf", [0.0, 0.4]).round(3)
     array([0.3  , 0.469])
     """
-    names = _checked_systems(system)
-    exponents = {name: exponent for name, (_, _, exponent) in ASCE7.items()}
-    deviation = checks.not_negative("height_log_std", height_log_std)
-    scatter: FloatArray = np.hypot(
-        _by_system(names, LOG_STD), _by_system(names, exponents) * deviation
-    )
-    return scatter
+    *_, exponent, _, scatter = _coefficients(system)
+    return np.hypot(scatter, exponent * np.asarray(height_log_std))

@@ -6,6 +6,7 @@ prints it. One row is one pair of neighbouring buildings; ``_1`` and ``_2`` mark
 and the axis points from 1 to 2.
 """
 
+from collections.abc import Collection
 from math import inf
 from typing import NamedTuple
 
@@ -175,10 +176,17 @@ COLUMNS: dict[str, Column] = {
         *(_of_building(column, 1) for column in _BUILDING),
         *(_of_building(column, 2) for column in _BUILDING),
     )
-}
+}  # fmt: skip
 
 #: Groups of which a file must have at least one column, and each row at least one value.
 ONE_OF = tuple((f"height_{i}", f"storeys_{i}", f"period_{i}") for i in (1, 2))
+
+
+def missing_columns(names: Collection[str]) -> list[tuple[str, ...]]:
+    """Return the required columns that are not among these, with those that would do instead."""
+    required = [(column.name,) for column in COLUMNS.values() if column.required]
+    return [group for group in (*required, *ONE_OF) if not set(group) & set(names)]
+
 
 #: Columns that ``completed_pairs`` adds to those above.
 COMPLETED: dict[str, Column] = {
@@ -187,12 +195,8 @@ COMPLETED: dict[str, Column] = {
         Column("longitude", "float64", "degrees", "longitude of the middle of the pair, east"),
         Column("latitude", "float64", "degrees", "latitude of the middle of the pair, north"),
         *(
-            Column(
-                f"contact_mass_{i}",
-                "float64",
-                "kg",
-                f"building {i}: generalised first-mode mass at contact height",
-            )
+            Column(f"contact_mass_{i}", "float64", "kg",
+                   f"building {i}: generalised first-mode mass at contact height")
             for i in (1, 2)
         ),
         Column(
@@ -203,4 +207,4 @@ COMPLETED: dict[str, Column] = {
         ),
         Column("derived", "str", "", "columns of this row that were derived or assumed, not given"),
     )
-}
+}  # fmt: skip

@@ -94,15 +94,6 @@ def test_energy_does_not_depend_on_where_it_is_seen(level):
     assert_allclose(seen, mode, rtol=1e-13)
 
 
-def test_contact_above_the_building_is_refused():
-    with pytest.raises(
-        ValueError, match=r"contact_height must not be above the building, got 1\.5"
-    ):
-        contact_participation(2, 6.0, 9.0)
-    with pytest.raises(ValueError, match=r"height must be positive, got 0\.0"):
-        contact_mass(1e5, 2, 0.0, 3.0)
-
-
 def test_floor_offset_does_not_depend_on_the_order():
     # would catch the storey height taken from the lower building
     assert_allclose(floor_offset(9.0, 3, 16.0, 4), 1.0, rtol=1e-14)

@@ -6,7 +6,6 @@ thousands; ``1,234`` may be either, so that another number of the table has to d
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
@@ -16,17 +15,20 @@ from numpy.typing import NDArray
 #: Signs between thousands other than comma and point: blanks and apostrophes.
 _GROUPS = "[ '’\u00a0\u202f]"
 
-#: Numbers whose comma is a decimal mark, whose commas are between thousands, whose comma may be
-#: either, and whose mark can only be a decimal point.
-_DECIMAL = (
-    rf"^\s*[+-]?(?:\d*,\d{{1,2}}|\d*,\d{{4,}}|0*,\d+|0\d*,\d+|\d{{4,}},\d+"
-    rf"|[1-9]\d{{0,2}}(?:(?:\.|{_GROUPS})\d{{3}})+,\d+)(?:[eE][+-]?\d+)?\s*$"
-)
-_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})\s*$"
+#: What the mark of a number can only be: a decimal comma, commas between thousands, or a decimal
+#: point; and numbers whose comma may be either of the first two.
+_KINDS = {
+    "decimal": (
+        rf"^\s*[+-]?(?:\d*,\d{{1,2}}|\d*,\d{{4,}}|0*,\d+|0\d*,\d+|\d{{4,}},\d+"
+        rf"|[1-9]\d{{0,2}}(?:(?:\.|{_GROUPS})\d{{3}})+,\d+)(?:[eE][+-]?\d+)?\s*$"
+    ),
+    "thousands": r"^\s*[+-]?[1-9]\d{0,2}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})\s*$",
+    "point": (
+        r"^\s*[+-]?(?:\d*\.\d{1,2}|\d*\.\d{4,}|0*\.\d+|0\d*\.\d+|\d{4,}\.\d+)"
+        r"(?:[eE][+-]?\d+)?\s*$"
+    ),
+}
 _EITHER = r"^\s*[+-]?[1-9]\d{0,2},\d{3}\s*$"
-_DECIMAL_POINT = (
-    r"^\s*[+-]?(?:\d*\.\d{1,2}|\d*\.\d{4,}|0*\.\d+|0\d*\.\d+|\d{4,}\.\d+)(?:[eE][+-]?\d+)?\s*$"
-)
 
 #: Characters to replace in a column of decimal commas; groups of digits among them.
 _WITH_COMMA = (
@@ -41,68 +43,70 @@ _POINT = r"^\s*[+-]?[1-9]\d{0,2}\.\d{3}\s*$"
 _WITH_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?\s*$"
 
 
-@dataclass
 class Evidence:
-    """Evidence in the numbers of a column about the meaning of their commas."""
+    """
+    Evidence in the numbers of a column about the meaning of their commas.
 
-    #: Whether a comma is a decimal mark, commas are between thousands, or a mark can only be a
-    #: decimal point.
-    decimal: bool = False
-    thousands: bool = False
-    point: bool = False
-    #: The first cell whose comma may be either; empty without one.
-    example: str = ""
-    #: Its line in the file.
-    line: int = 0
+    Attributes
+    ----------
+    kinds : set of str
+        What a mark of it can only be: ``"decimal"`` commas, commas between ``"thousands"``, a
+        decimal ``"point"``.
+    example : str
+        The first cell whose comma may be either; empty without one.
+    line : int
+        Its line in the file.
+    """
 
-    @property
-    def has_commas(self) -> bool:
-        """Whether a number has a comma."""
-        return self.decimal or self.thousands or self.example != ""
+    def __init__(self) -> None:
+        self.kinds, self.example, self.line = set[str](), "", 0
 
     def add(self, cells: pa.ChunkedArray, lines: Sequence[int] | NDArray[np.int64]) -> None:
         """Add the evidence of further cells, of the lines of a file."""
         commas = cells.filter(pc.match_substring(cells, ","))
-        self.decimal = self.decimal or _any(commas, _DECIMAL)
-        self.thousands = self.thousands or _any(commas, _THOUSANDS)
-        # The sign alone is sought faster
-        points = cells if self.point else cells.filter(pc.match_substring(cells, "."))
-        self.point = self.point or _any(points, _DECIMAL_POINT)
-        if not self.example and _any(commas, _EITHER):
+        for kind, pattern in _KINDS.items():
+            if kind in self.kinds:
+                continue
+            # The sign alone is sought faster
+            is_point = kind == "point"
+            some = cells.filter(pc.match_substring(cells, ".")) if is_point else commas
+            if pc.any(pc.match_substring_regex(some, pattern)).as_py():
+                self.kinds.add(kind)
+        if len(commas) and not self.example:
             place = pc.index(pc.match_substring_regex(cells, _EITHER), value=True).as_py()
-            self.example, self.line = str(cells[place].as_py()).strip(), int(lines[place])
+            if place >= 0:
+                self.example, self.line = str(cells[place].as_py()).strip(), int(lines[place])
 
 
-def _any(cells: pa.ChunkedArray, pattern: str) -> bool:
-    """Return whether any text is of a pattern."""
-    return len(cells) > 0 and bool(pc.any(pc.match_substring_regex(cells, pattern)).as_py())
-
-
-def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str, Evidence]]:
+def marks_of(
+    evidence: Mapping[str, Evidence], given: str = ""
+) -> tuple[dict[str, str], dict[str, Evidence]]:
     """
     Return the decimal mark of each column that has commas, and the columns that remain undecided.
 
     A column whose numbers contradict each other keeps its text, so that rows with a comma in it are
-    rejected.
+    rejected. A ``given`` mark is that of all columns with commas.
     """
-    columns = evidence.values()
-    has_points = any(column.point for column in columns)
-    has_decimals = any(column.decimal for column in columns)
-    has_thousands = any(column.thousands for column in columns)
+    kinds = set[str]().union(*(column.kinds for column in evidence.values()))
     # Ambiguous numbers are decided by the only kind of commas in the table
-    others = "," if has_decimals and not has_points else "." if has_thousands else ""
+    others = {"decimal": ",", "thousands": "."}.get("".join(kinds - {"point"}), "")
+    if others == "," and "point" in kinds:
+        others = ""
     marks, doubtful = dict[str, str](), dict[str, Evidence]()
     for name, column in evidence.items():
         # The numbers of the column decide, else those of the other columns
-        kinds = (column.decimal, column.thousands, column.point)
-        if kinds == (True, False, False):
-            marks[name] = ","
-        elif kinds[:2] == (False, True):
-            marks[name] = "."
-        elif column.example and not any(kinds) and others and has_decimals != has_thousands:
-            marks[name] = others
-        elif column.example and not column.decimal:
-            doubtful[name] = column
+        if given:
+            mark = given if column.example or column.kinds - {"point"} else ""
+        elif column.kinds == {"decimal"}:
+            mark = ","
+        elif "thousands" in column.kinds and "decimal" not in column.kinds:
+            mark = "."
+        else:
+            mark = others if column.example and not column.kinds else ""
+            if not mark and column.example and "decimal" not in column.kinds:
+                doubtful[name] = column
+        if mark:
+            marks[name] = mark
     return marks, doubtful
 
 

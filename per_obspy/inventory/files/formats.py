@@ -1,18 +1,19 @@
 """
 Files of pairs: one reader of text, workbooks and Parquet files, which are opened by their suffix.
 
-A file is read once for what its cells have in common (decimal marks, units, types), once for
-identifiers that may occur twice, then block by block.
+A file is read once for what its cells have in common (decimal marks, units, types, identifiers that
+may occur twice), then block by block.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError
@@ -27,7 +28,7 @@ from per_obspy.inventory.cells import (
 from per_obspy.inventory.files.decimal_marks import Evidence, marks_of, two_readings, with_points
 from per_obspy.inventory.files.headings import IDENTIFIER
 from per_obspy.inventory.files.parquet import open_parquet
-from per_obspy.inventory.files.raw_rows import Contents, RawRows, regrouped
+from per_obspy.inventory.files.raw_rows import Contents, RawRows, name_hashes, regrouped, stripped
 from per_obspy.inventory.files.side_file import form_of
 from per_obspy.inventory.files.text_cells import given_text, given_texts
 from per_obspy.inventory.files.text_lines import TURKISH, open_text, two_pages
@@ -91,7 +92,7 @@ class PairFile:
     def recognised(self) -> str:
         """Recognised peculiarities of the file, empty if there are none; reads the whole file."""
         # Columns by their decimal mark
-        marks = self._survey[0].marks
+        marks = self._survey.form.marks
         kinds = {",": "decimal commas in ", ".": "commas between thousands in "}
         texts = [*self._contents.form, self.meanings.sentence()]
         for mark, kind in kinds.items():
@@ -123,16 +124,10 @@ class PairFile:
             mend = "separate columns by semicolons, or put cells with commas in quotation marks"
             raise CatalogError(first.source, f"{reason}, as decimal commas make: {mend}")
 
-    def identifiers(self) -> Iterator[pa.Array]:
-        """Yield the identifiers of the pairs, block by block."""
-        is_named = IDENTIFIER in self.names
-        for rows in self._blocks([IDENTIFIER] if is_named else self.names[:1]):
-            column = rows.table.column(0).cast(pa.string())
-            names = given_texts(column) if self._contents.is_text else column
-            known = names.combine_chunks() if is_named else pa.nulls(len(names), pa.string())
-            # Rows of a Parquet file that are left out are counted as well
-            lost = 0 if self._contents.is_text else len(rows.broken)
-            yield pa.concat_arrays([known, pa.nulls(lost, pa.string())])
+    @property
+    def hashes(self) -> NDArray[np.uint64]:
+        """Hashes of the identifiers of all rows, those of a Parquet file that are left out too."""
+        return self._survey.hashes
 
     def rows(self, size: int, are_pairs: bool = True) -> Iterator[RawRows]:
         """
@@ -149,7 +144,7 @@ class PairFile:
                 # Numbers and texts as far as they are plain, then values
                 columns = {name: self._converted(name, table[name]) for name in self.names}
                 table, lines = pa.table(columns).filter(pa.array(full)), lines[full]
-            values = with_values(table, self._survey[0]) if are_pairs else table
+            values = with_values(table, self._survey.form) if are_pairs else table
             yield rows._replace(table=values, lines=lines)
 
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
@@ -159,48 +154,40 @@ class PairFile:
             yield rows._replace(table=rows.table.rename_columns(list(names)))
 
     @cached_property
-    def _survey(self) -> tuple[CellForm, dict[str, list[pa.DataType]]]:
+    def _survey(self) -> "_Survey":
         """
-        Return the form of the cells, and the types of number of columns unknown to the schema.
+        Return what the cells of the whole file have in common.
 
         Raises
         ------
         CatalogError
             If a number may be read in two ways, or a text of a known column may be.
         """
-        common = _Common(self._contents, self.names)
-        for rows in self._blocks(common.names) if common.names else ():
-            common.add(rows)
-        marks, meanings = self._marks(common.evidence), self.meanings
-        form = CellForm(meanings.units, marks, meanings.language, common.gap_unit)
-        return form, common.types
-
-    def _marks(self, evidence: Mapping[str, Evidence]) -> dict[str, str]:
-        """Return the decimal mark of each column that has commas."""
-        if self._given.decimal:
-            commas = [name for name, column in evidence.items() if column.has_commas]
-            return dict.fromkeys(commas, self._given.decimal)
+        survey = _Survey(self._contents, self.names)
+        blocks = list(map(survey.add, self._blocks(survey.names)))
+        survey.hashes = np.concatenate([np.empty(0, dtype=np.uint64), *blocks])
         # The user has to decide if no number in the file does
-        marks, doubtful = marks_of(evidence)
+        marks, doubtful = marks_of(survey.evidence, self._given.decimal or "")
         for name, column in doubtful.items():
             raise CatalogError(self._contents.source, two_readings(name, column))
-        return marks
+        units, language = self.meanings.units, self.meanings.language
+        survey.form = CellForm(units, marks, language, survey.gap_unit)
+        return survey
 
     def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
         """Return a column of text as numbers if every cell is one, else as text."""
-        form, types = self._survey
-        if name not in COLUMNS and types.get(name):
-            return _as_numbers(cells, types[name][0])
+        if types := self._survey.types.get(name):
+            return _as_numbers(cells, types[0])
         if name not in COLUMNS or COLUMNS[name].dtype == "str":
             return given_texts(cells)
         # Commas between storeys may make a list
-        mark = form.marks.get(name) if bare_name(name) != "storeys" else None
+        mark = self._survey.form.marks.get(name) if bare_name(name) != "storeys" else None
         points = with_points(cells, mark) if mark else cells
         numbers = _as_numbers(points, pa.float64())
         return points if numbers is None else numbers
 
 
-class _Common:
+class _Survey:
     """
     What the cells of a file have in common.
 
@@ -208,16 +195,25 @@ class _Common:
     ----------
     names : list of str
         Columns that have to be read for it.
+    form : CellForm
+        How the cells are written.
     evidence : dict of str to Evidence
         Columns of numbers of the schema in a text -> meaning of their commas.
     types : dict of str to list of DataType
         Other columns of a text -> types of number that each of their cells can be.
     gap_unit : str
         A unit other than m that gaps have in their cells.
+    hashes : (n_rows,) ndarray of uint64
+        Of the identifiers.
     """
+
+    form = PLAIN_CELLS
+    hashes: NDArray[np.uint64]
 
     def __init__(self, contents: Contents, names: Sequence[str]) -> None:
         is_number = {name: COLUMNS[name].dtype != "str" for name in names if name in COLUMNS}
+        self._is_text = contents.is_text
+        # Marks and types only where every cell is text
         text = names if contents.is_text else ()
         self.evidence = {name: Evidence() for name in text if is_number.get(name)}
         self.types = {name: [pa.int64(), pa.float64()] for name in text if name not in COLUMNS}
@@ -225,27 +221,43 @@ class _Common:
         # Texts only where letters are in doubt, gaps only where the heading has no unit
         self._texts = [name for name in is_number if contents.is_doubtful and not is_number[name]]
         self._gap = "" if "gap" in contents.meanings.units else "gap"
-        chosen = {*self.evidence, *self.types, *self._texts, self._gap}
-        self.names = [name for name in names if name in chosen]
+        chosen = {*self.evidence, *self.types, *self._texts, self._gap, IDENTIFIER}
+        self.names = [name for name in names if name in chosen] or [*names[:1]]
 
-    def add(self, rows: RawRows) -> None:
-        """Look at further rows; raise CatalogError for a text that depends on the code page."""
+    def add(self, rows: RawRows) -> NDArray[np.uint64]:
+        """Look at further rows, and return the hashes of their identifiers."""
         for name, cells in zip(rows.table.column_names, rows.table.columns, strict=True):
             if name in self.evidence:
                 self.evidence[name].add(cells, rows.lines)
             if name in self.types:
                 # Drop every type that a cell contradicts
-                possible = {kind: _as_numbers(cells, kind) for kind in self.types[name]}
-                self.types[name] = [kind for kind in possible if possible[kind] is not None]
+                self.types[name] = [
+                    kind for kind in self.types[name] if _as_numbers(cells, kind) is not None
+                ]
             if name == self._gap and not self.gap_unit and pa.types.is_string(cells.type):
                 has_unit = pc.match_substring_regex(cells, r"\d\s*(?:\pL|['’′″”\"])")
                 self.gap_unit = unit_in_cells(pc.unique(cells.filter(has_unit)).to_pylist())
             if name in self._texts:
-                # The first cell with a letter that is another one in Turkey
-                place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
-                if place >= 0:
-                    problem = two_pages(name, cells[place].as_py())
-                    raise CatalogError(rows.source, f"line {rows.lines[place]}: {problem}")
+                _check_letters(name, cells, rows)
+        return self._hashes(rows)
+
+    def _hashes(self, rows: RawRows) -> NDArray[np.uint64]:
+        """Return the hashes of the identifiers of some rows."""
+        names = pa.nulls(len(rows.table), pa.string())
+        if IDENTIFIER in rows.table.column_names:
+            names = rows.table[IDENTIFIER].cast(pa.string())
+            names = (given_texts(names) if self._is_text else names).combine_chunks()
+        # Rows of a Parquet file that are left out are counted as well
+        lost = 0 if self._is_text else len(rows.broken)
+        return name_hashes(stripped(pa.concat_arrays([names, pa.nulls(lost, pa.string())])))
+
+
+def _check_letters(name: str, cells: pa.ChunkedArray, rows: RawRows) -> None:
+    """Raise CatalogError for the first cell with a letter that is another one in Turkey."""
+    place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
+    if place >= 0:
+        problem = two_pages(name, cells[place].as_py())
+        raise CatalogError(rows.source, f"line {rows.lines[place]}: {problem}")
 
 
 def _as_numbers(cells: pa.ChunkedArray, kind: pa.DataType) -> pa.ChunkedArray | None:

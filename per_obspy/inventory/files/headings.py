@@ -24,7 +24,7 @@ from per_obspy.inventory.files.words import (
     word_rows,
     words,
 )
-from per_obspy.inventory.schema import COLUMNS, ONE_OF
+from per_obspy.inventory.schema import COLUMNS, missing_columns
 
 #: Column with the name of the pair.
 IDENTIFIER = "pair_id"
@@ -96,7 +96,7 @@ class Meanings(NamedTuple):
             if heading or unit:
                 text = f"{name} = {heading!r}" if heading else name
                 texts.append(f"{text} in {unit}" if unit else text)
-        if IDENTIFIER not in self.names and is_complete(set(self.names)):
+        if IDENTIFIER not in self.names and not missing_columns(self.names):
             texts.append(f"no {IDENTIFIER}: each pair is named by its row, as 'row 2'")
         return ", ".join(texts)
 
@@ -210,7 +210,7 @@ def recognised(headings: Sequence[str], known: Mapping[int, str]) -> dict[int, H
     for place, heading in enumerate(headings):
         if heading in COLUMNS and heading not in known.values():
             meanings.setdefault(place, Heading(heading))
-    if is_complete({means.column for means in meanings.values()}):
+    if not missing_columns([means.column for means in meanings.values()]):
         return meanings
     # Words that are sure, each for one column
     for claims in _claims(headings, meanings).values():
@@ -321,17 +321,6 @@ def _tokens(text: str) -> list[str]:
     """Return the words and numbers of a heading, without those that have no meaning."""
     tokens = re.findall(r"[^\W\d_]+|\d+", plain_word(text))
     return [token for token in tokens if token not in words("filler")] or tokens[:1]
-
-
-def missing_columns(names: set[str]) -> list[str]:
-    """Return required columns that are not among these; of a group the first, if none of it is."""
-    missing = [name for name, column in COLUMNS.items() if column.required and name not in names]
-    return missing + [group[0] for group in ONE_OF if not names & set(group)]
-
-
-def is_complete(names: set[str]) -> bool:
-    """Return whether these columns of the schema are all that a pair table needs."""
-    return not missing_columns(names)
 
 
 def is_building_list(headings: Sequence[str]) -> bool:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
@@ -49,13 +48,36 @@ class Contents(NamedTuple):
     is_doubtful: bool = False
 
 
-def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
-    """Return a hash of each identifier without the blanks around it."""
-    text = pc.fill_null(pc.utf8_trim_whitespace(names), "").to_numpy(zero_copy_only=False)
-    hashes: NDArray[np.uint64] = pd.util.hash_array(
-        np.asarray(text, dtype=object), categorize=False
-    )
-    return hashes
+def stripped(names: pa.Array | pa.ChunkedArray) -> pa.StringArray:
+    """Return identifiers as text without the blanks around them, "" where there is none."""
+    texts = pc.utf8_trim_whitespace(pc.fill_null(pc.cast(names, pa.string()), ""))
+    return texts.combine_chunks() if isinstance(texts, pa.ChunkedArray) else texts
+
+
+def name_hashes(names: pa.StringArray) -> NDArray[np.uint64]:
+    """Return a hash of the last 256 bytes of each text, none of which is 0; shape (n_names,)."""
+    _, offsets, content = names.buffers()
+    edges = np.frombuffer(offsets, np.int32, len(names) + 1, 4 * names.offset)
+    length = np.minimum(np.diff(edges), 256)
+    start = edges[1:] - length
+    # Words of 8 bytes from any byte on
+    padded = bytes(content or b"") + bytes(8)
+    words = np.ndarray(len(padded) - 7, dtype="<u8", buffer=padded, strides=(1,))
+    hashes = length.astype(np.uint64)
+    for first in range(0, int(length.max(initial=0)), 8):
+        rows = np.flatnonzero(length > first)
+        # Bytes beyond the end of a text belong to the next one
+        beyond = np.maximum(first + 8 - length[rows], 0).astype(np.uint64)
+        word = words[start[rows] + first] << (np.uint64(8) * beyond)
+        hashes[rows] = mixed(hashes[rows] + word)
+    return hashes | np.uint64(1)
+
+
+def mixed(hashes: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return hashes whose bits are mixed (finaliser of SplitMix64, Steele and others, 2014)."""
+    mixed = (hashes ^ (hashes >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return mixed ^ (mixed >> np.uint64(31))
 
 
 def regrouped(blocks: Iterable[RawRows], size: int) -> Iterator[RawRows]:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.config import TableForm
@@ -16,7 +15,7 @@ from per_obspy.inventory.cells import read_columns
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs, row_names
 from per_obspy.inventory.files.formats import PairFile, pair_file
 from per_obspy.inventory.files.headings import IDENTIFIER
-from per_obspy.inventory.files.raw_rows import RawRows, name_hashes
+from per_obspy.inventory.files.raw_rows import RawRows, name_hashes, stripped
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.suspicions import ODD, Suspicions
 
@@ -118,7 +117,9 @@ def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
     # Values for the account; the checks read the cells themselves, with their notes
     numbers = {name: cells for name, cells in known.items() if COLUMNS[name].dtype != "str"}
     texts = {name: cells.astype(str).mask(cells.isna()) for name, cells in known.items()}
-    cells = pd.DataFrame(texts | read_columns(numbers) | {IDENTIFIER: row_names(table, lines)})
+    cells = pd.DataFrame(
+        texts | read_columns(numbers) | {IDENTIFIER: row_names(table.get(IDENTIFIER), lines)}
+    )
     raw = RawRows("table", pa.Table.from_pandas(cells, preserve_index=False), lines, ())
     return _checked_whole(raw, table)
 
@@ -127,7 +128,7 @@ def _checked_whole(rows: RawRows, table: pd.DataFrame | None = None) -> pd.DataF
     """Check all rows of a file, or of a table in memory, with suspicions and proposed units."""
     # The account comes first, as the checks leave rows out
     account = Suspicions()
-    repeated = pd.Series(name_hashes(_identifiers(rows.table))).duplicated().to_numpy()
+    repeated = pd.Series(name_hashes(stripped(rows.table[IDENTIFIER]))).duplicated().to_numpy()
     odd = account.add(rows.source, rows.table, rows.lines, repeated)
     if table is None:
         pairs = _checked(rows, None, odd)
@@ -177,23 +178,15 @@ class PairInventory:
         self.suspicions = Suspicions()
         self.names = set.intersection(*(set(file.names) for file in self._files.values()))
         # Hashes that occur twice: candidates for repeated identifiers
-        self.rows = dict[Path, int]()
-        hashes = self._identifier_hashes()
-        self.count = len(hashes)
-        distinct, times = np.unique(hashes, return_counts=True)
-        self._repeated: NDArray[np.uint64] = distinct[times > 1]
-
-    def _identifier_hashes(self) -> NDArray[np.uint64]:
-        """Return a hash per row of all files; raise CatalogError if a file has no row."""
-        # Read every file before any is refused
-        hashes = {}
-        for path, file in self._files.items():
-            hashes[path] = [name_hashes(block) for block in file.identifiers()]
-        for path, blocks in hashes.items():
-            self.rows[path] = sum(map(len, blocks))
-            if not self.rows[path]:
+        # Every file is read before any is refused
+        hashes = {path: file.hashes for path, file in self._files.items()}
+        self.rows = {path: len(names) for path, names in hashes.items()}
+        for path, count in self.rows.items():
+            if not count:
                 raise CatalogError(str(path), "the table has no rows")
-        return np.concatenate([block for blocks in hashes.values() for block in blocks])
+        self.count = sum(self.rows.values())
+        distinct, times = np.unique(np.concatenate([*hashes.values()]), return_counts=True)
+        self._repeated: NDArray[np.uint64] = distinct[times > 1]
 
     def chunks(self, size: int) -> Iterator[PairChunk]:
         """Yield chunks of so many rows; no chunk has rows of two files."""
@@ -220,22 +213,14 @@ def _named(rows: RawRows, prefix: str) -> RawRows:
     table, is_named = rows.table, IDENTIFIER in rows.table.column_names
     if is_named and not prefix:
         return rows  # empty names are left to the checks
-    given = table[IDENTIFIER] if is_named else pa.nulls(len(table), pa.string())
-    names = row_names(pd.DataFrame({IDENTIFIER: given.to_pandas()}), rows.lines, prefix)
-    column = pa.array(names, pa.string())
+    names = row_names(table[IDENTIFIER].to_pandas() if is_named else None, rows.lines, prefix)
     others = table.drop_columns([IDENTIFIER]) if is_named else table
-    return rows._replace(table=others.append_column(IDENTIFIER, column))
+    return rows._replace(table=others.append_column(IDENTIFIER, pa.array(names, pa.string())))
 
 
 def recognised_line(path: Path, recognised: str) -> str:
     """Return the line that describes how a table is read, with the name of its file."""
     return printable(f"{path.name}: read as {recognised}")
-
-
-def _identifiers(table: pa.Table) -> pa.Array:
-    """Return the identifiers of pairs without the blanks around them."""
-    filled = pc.fill_null(table[IDENTIFIER].cast(pa.string()), "")
-    return pc.utf8_trim_whitespace(filled).combine_chunks()
 
 
 def _repeated(table: pa.Table, hashes: NDArray[np.uint64], seen: set[str]) -> NDArray[np.bool_]:
@@ -244,7 +229,7 @@ def _repeated(table: pa.Table, hashes: NDArray[np.uint64], seen: set[str]) -> ND
 
     Only identifiers whose hash is repeated are added to those seen.
     """
-    text = _identifiers(table)
+    text = stripped(table[IDENTIFIER])
     # A hash may be shared by chance: the identifiers themselves decide
     repeated = np.isin(name_hashes(text), hashes)
     for row in np.flatnonzero(repeated).tolist():

@@ -12,11 +12,10 @@ line is a row again.
 import codecs
 import csv
 import re
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import islice
+from mmap import ACCESS_READ, mmap
 from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
@@ -30,18 +29,18 @@ from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.files import looks_like
 from per_obspy.inventory.cells import is_unknown, read_number
-from per_obspy.inventory.files.headings import Meanings, is_complete, meanings_of
+from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
 from per_obspy.inventory.files.text_cells import given_text
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.schema import missing_columns
 
-#: Bytes read at once.
+#: Characters read at once.
 BLOCK = 1 << 20
 
 #: Most lines of one row; a quotation over more of them is one that is not closed.
 LONGEST_ROW = 100
 
-#: Longest line, bytes, and longest name of a row in messages.
+#: Longest line, characters, and longest name of a row in messages.
 LONGEST_LINE, LONGEST_NAME = 8 << 20, 80
 
 #: Lines among which the header is sought: titles and blank lines may precede it.
@@ -165,7 +164,7 @@ def _rank(form: TextForm) -> tuple[bool, int, bool]:
     Turkish code page.
     """
     columns = form.meanings.columns
-    is_plain = form.header == 1 and is_complete(set(form.meanings.cells) & set(COLUMNS))
+    is_plain = form.header == 1 and not missing_columns(form.meanings.cells)
     is_turkish = form.encoding == TURKISH_PAGE and form.meanings.language == "tr"
     return is_plain, len(columns), is_turkish
 
@@ -187,10 +186,10 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
 def _first_lines(file: Path, encoding: str) -> list[str]:
     """Return the first lines of a file."""
     try:
-        block = next(_whole_lines(file, text_blocks(file, encoding)), b"")
+        block = next(_whole_lines(file, encoding), "")
     except UnicodeDecodeError:
         return []
-    return block.decode("utf-8", "replace").split("\n")[:HEADER_LINES]
+    return block.split("\n")[:HEADER_LINES]
 
 
 def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, list[str], str]]:
@@ -279,18 +278,14 @@ def possible_encodings(file: Path, given: str | None = None) -> dict[str, int | 
 
 def _has_letters(file: Path) -> bool:
     """Return whether a text has a letter of several bytes as UTF-8 has it."""
-    last = b""
-    for block in text_blocks(file):
-        if _UTF_8_LETTER.search(last + block):
-            return True
-        last = block[-3:]
-    return False
+    with file.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as content:
+        return _UTF_8_LETTER.search(content) is not None
 
 
 def _can_be(file: Path, encoding: str) -> bool:
     """Return whether a text can be in an encoding."""
     with suppress(UnicodeDecodeError):
-        return all(block is not None for block in text_blocks(file, encoding))
+        return all(text_blocks(file, encoding))
     return False
 
 
@@ -316,35 +311,18 @@ def two_pages(name: str, text: str) -> str:
     return f'{reason}, and no heading decides: give encoding = "cp1252" or "cp1254" in [pairs]'
 
 
-def text_blocks(file: Path, encoding: str = UTF_8) -> Iterator[bytes]:
+def text_blocks(file: Path, encoding: str = UTF_8) -> Iterator[str]:
     """
-    Yield the text of a file in UTF-8, without a mark of the byte order.
-
-    Parameters
-    ----------
-    file : Path
-        Text.
-    encoding : str
-        That of the file; UTF-8 is passed on as it is, right or wrong.
+    Yield the text of a file whose lines all end with a line feed, without a mark of the byte order.
 
     Raises
     ------
     UnicodeDecodeError
-        If the file is in another encoding than UTF-8 and than this one.
+        If the file is in another encoding.
     """
-    mark = codecs.BOM_UTF8
-    with file.open("rb") as stream:
-        if encoding == UTF_8:
-            if stream.read(len(mark)) != mark:
-                stream.seek(0)
-            while block := stream.read(BLOCK):
-                yield block
-            return
-        # A character may lie across blocks
-        decoder = codecs.getincrementaldecoder(encoding)()
+    with file.open(encoding="utf-8-sig" if encoding == UTF_8 else encoding) as stream:
         while block := stream.read(BLOCK):
-            yield decoder.decode(block).encode("utf-8", "surrogatepass")
-        yield decoder.decode(b"", final=True).encode("utf-8", "surrogatepass")
+            yield block
 
 
 def check_text(file: Path, encoding: str = UTF_8) -> int:
@@ -358,24 +336,18 @@ def check_text(file: Path, encoding: str = UTF_8) -> int:
     """
     if kind := looks_like(file):
         raise CatalogError(str(file), f"not a CSV table: it is {kind}")
-    # Decode block by block, so that a file of any size fits
-    decoder, lines, last = codecs.getincrementaldecoder(UTF_8)(), 0, b""
+    lines, block = 0, ""
     try:
         for block in text_blocks(file, encoding):
-            decoder.decode(block)
-            # Line ends of any kind, of which one may lie across blocks
-            pairs = block.count(b"\r\n") + (last == b"\r" and block.startswith(b"\n"))
-            lines += block.count(b"\n") + block.count(b"\r") - pairs
-            last = block[-1:] or last
-            if b"\0" in block:
+            lines += block.count("\n")
+            if "\0" in block:
                 problem = "not a CSV table: it holds zero bytes, as no text does"
                 raise CatalogError(str(file), problem)
-        decoder.decode(b"", final=True)
     except UnicodeDecodeError as error:
         problem = _undecodable(file) if encoding == UTF_8 else f"is no text in {encoding}: {error}"
         raise CatalogError(str(file), problem) from error
     # The last line may lack its end
-    return lines + (last not in (b"\n", b"\r"))
+    return lines + (not block.endswith("\n"))
 
 
 def _undecodable(file: Path) -> str:
@@ -427,26 +399,25 @@ def _parsed(
         return "skip"
 
     # With threads, the reader does not number the rows; a block is read in one piece
+    text = rows.text.encode()
     columns = [str(place) for place in range(len(form.meanings.cells))]
-    reading = pa.csv.ReadOptions(
-        use_threads=False, column_names=columns, block_size=len(rows.text) + 1
-    )
+    reading = pa.csv.ReadOptions(use_threads=False, column_names=columns, block_size=len(text) + 1)
     # Blank lines are rows here, so that all are counted
     parsing = pa.csv.ParseOptions(
         delimiter=form.separator, ignore_empty_lines=False, invalid_row_handler=skip
     )
-    return pa.csv.read_csv(pa.BufferReader(rows.text), reading, parsing, options)
+    return pa.csv.read_csv(pa.BufferReader(text), reading, parsing, options)
 
 
 class RowLines(NamedTuple):
     """Consecutive rows of a text table."""
 
     #: One line per row; line breaks inside of cells have become blanks.
-    text: bytes
+    text: str
     #: Line of the file on which each row begins; the header is line 1. Shape (n_rows,).
     numbers: NDArray[np.int64]
     #: Lines between the rows whose quotation marks are wrong.
-    broken: tuple[Rejection, ...]
+    broken: Sequence[Rejection]
 
 
 def row_lines(file: Path, form: TextForm) -> Iterator[RowLines]:
@@ -459,38 +430,29 @@ def row_lines(file: Path, form: TextForm) -> Iterator[RowLines]:
         If the lines that were read are not those that the file had.
     """
     scanner, header = _Scanner(file, form), form.header_end
-    for block in _whole_lines(file, text_blocks(file, form.encoding)):
+    for block in _whole_lines(file, form.encoding):
         # Lines up to the header, which may be in several blocks
-        above = min(header, block.count(b"\n"))
+        above = min(header, block.count("\n"))
         header -= above
-        yield scanner.rows(block.split(b"\n", above)[-1] if above else block)
-    yield scanner.rows(b"", is_last=True)
+        yield scanner.rows(block.split("\n", above)[-1])
+    yield scanner.rows("", is_last=True)
     if scanner.number != form.lines + 1:
         read = scanner.number - 1
         problem = f"{form.lines} lines, of which {read} were read: was the file changed meanwhile?"
         raise CatalogError(str(file), problem)
 
 
-def _whole_lines(file: Path, blocks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield whole lines, which all end with a line feed."""
-    rest = b""
-    for block in blocks:
-        rest += block
-        # A carriage return at the end may belong to a line feed that follows
-        end = 1 + max(rest.rfind(b"\n"), rest.rfind(b"\r", 0, -1))
+def _whole_lines(file: Path, encoding: str) -> Iterator[str]:
+    """Yield the whole lines of a file, which all end with a line feed."""
+    rest = ""
+    for block in text_blocks(file, encoding):
+        lines, end, rest = (rest + block).rpartition("\n")
         if end:
-            yield _with_line_feeds(rest[:end])
-            rest = rest[end:]
+            yield lines + end
         elif len(rest) > LONGEST_LINE:
-            problem = f"a line is longer than {LONGEST_LINE >> 20} MB"
-            raise CatalogError(str(file), problem)
+            raise CatalogError(str(file), f"a line is longer than {LONGEST_LINE >> 20} MB")
     if rest:
-        yield _with_line_feeds(rest if rest.endswith(b"\r") else rest + b"\n")
-
-
-def _with_line_feeds(text: bytes) -> bytes:
-    """Return text whose lines all end with a line feed."""
-    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
+        yield rest + "\n"
 
 
 class _Scanner:
@@ -507,68 +469,66 @@ class _Scanner:
         self.number = form.header_end + 1
         self._file, self._separator = file, form.separator
         # Lines of a row that goes on in the next block
-        self._waiting: deque[bytes] = deque()
+        self._waiting: list[str] = []
         names = [name.strip() for name in form.meanings.names]
         self._width, self._gap = len(names), names.index("gap") if "gap" in names else len(names)
 
-    def rows(self, block: bytes, is_last: bool = False) -> RowLines:
+    def rows(self, block: str, is_last: bool = False) -> RowLines:
         """Return the rows of some whole lines, and of those that waited for them."""
         # Most blocks have no quotation mark: each line is a row
-        if b'"' not in block and not self._waiting:
-            first, self.number = self.number, self.number + block.count(b"\n")
+        if '"' not in block and not self._waiting:
+            first, self.number = self.number, self.number + block.count("\n")
             return RowLines(block, np.arange(first, self.number), ())
-        self._waiting.extend(block.split(b"\n")[:-1])
-        rows, numbers, broken = list[bytes](), list[int](), list[Rejection]()
+        lines = self._waiting + block.split("\n")[:-1]
+        at = 0
+        rows, numbers, broken = list[str](), list[int](), list[Rejection]()
         # One row after the other, as far as their lines are here
-        while (row := self._next(is_last)) is not None:
+        while row := self._next(lines[at : at + LONGEST_ROW], is_last):
             count, fault = row
-            lines = [self._waiting.popleft() for _ in range(count)]
             if fault:
-                broken.append(self._rejection(lines[0], fault))
+                broken.append(self._rejection(lines[at], fault))
             else:
-                rows.append(b" ".join(lines) + b"\n")
+                rows.append(" ".join(lines[at : at + count]) + "\n")
                 numbers.append(self.number)
+            at += count
             self.number += count
-        return RowLines(b"".join(rows), np.array(numbers, dtype=np.int64), tuple(broken))
+        # The others wait for further lines
+        self._waiting = lines[at:]
+        return RowLines("".join(rows), np.array(numbers, np.int64), broken)
 
-    def _rejection(self, line: bytes, fault: str) -> Rejection:
+    def _rejection(self, line: str, fault: str) -> Rejection:
         """Return the rejection of the next line."""
-        name = line.partition(self._separator.encode())[0].strip(b'" ')[:LONGEST_NAME]
-        text = name.decode("utf-8", "replace")
-        return Rejection("pair", text, str(self._file), self.number, (fault,))
+        name = line.partition(self._separator)[0].strip('" ')[:LONGEST_NAME]
+        return Rejection("pair", name, str(self._file), self.number, (fault,))
 
-    def _next(self, is_last: bool) -> tuple[int, str] | None:
+    def _next(self, lines: Sequence[str], is_last: bool) -> tuple[int, str] | None:
         """Return the number of lines of the next row and its fault; None if more are needed."""
-        if not self._waiting:
+        if not lines:
             return None
         # A row on one line, or a fault on it
-        first = self._waiting[0]
-        fault = self._cells(first)[1] if b'"' in first else ""
+        first = lines[0]
+        fault = _cells(first, self._separator)[1] if '"' in first else ""
         if fault != OPEN:
             return 1, fault
         # Go on to the line that closes the quotation
-        for count, line in enumerate(islice(self._waiting, 1, LONGEST_ROW), start=2):
-            _, rest = self._cells(b'"' + line)
+        for count, line in enumerate(lines[1:], start=2):
+            _, rest = _cells(f'"{line}', self._separator)
             if not rest:
-                cells, _ = self._cells(b"\n".join(islice(self._waiting, count)))
+                cells, _ = _cells("\n".join(lines[:count]), self._separator)
                 is_row = len(cells) == self._width and not self._begins_again(first, line)
                 return (count, "") if is_row else (1, OPEN)
             if rest == AFTER or self._begins_again(first, line):
                 return 1, OPEN
-        return (1, OPEN) if is_last or len(self._waiting) >= LONGEST_ROW else None
+        return (1, OPEN) if is_last or len(lines) >= LONGEST_ROW else None
 
-    def _begins_again(self, first: bytes, line: bytes) -> bool:
+    def _begins_again(self, first: str, line: str) -> bool:
         """Return whether a line is a row of its own, and none that goes on with a first line."""
         # A line that closes the first cell of a row has all others too
-        sign = self._separator.encode()
-        has_all = first.count(sign) >= self._width - 1
-        if not (has_all or b'"' not in line) or line.count(sign) < self._width - 1:
+        has_all = first.count(self._separator) >= self._width - 1
+        is_whole = line.count(self._separator) >= self._width - 1
+        if not is_whole or ('"' in line and not has_all):
             return False
         # A gap that is a number, with either decimal mark, or a word, but no text
-        cells, _ = self._cells(line, strict=False)
+        cells, _ = _cells(line, self._separator, strict=False)
         gap = cells[self._gap] if self._gap < len(cells) else "no row"
         return is_unknown(gap) or not np.isnan(read_number("gap", gap.replace(",", ".")).number)
-
-    def _cells(self, row: bytes, strict: bool = True) -> tuple[list[str], str]:
-        """Return the cells of a row, and the fault of its quotation marks."""
-        return _cells(row.decode("utf-8", "replace"), self._separator, strict)

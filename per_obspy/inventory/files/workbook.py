@@ -12,9 +12,9 @@ import re
 import zipfile
 import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date, datetime, time
-from functools import partial, reduce
+from functools import reduce
 from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -27,9 +27,10 @@ import pyarrow.compute as pc
 from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, printable, require_extra, shortened
 from per_obspy.files import looks_like
-from per_obspy.inventory.files.headings import Meanings, is_complete, meanings_of
+from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
 from per_obspy.inventory.files.text_cells import given_text
+from per_obspy.inventory.schema import missing_columns
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
 
 #: Processor time and memory of the library.
@@ -104,14 +105,15 @@ def open_workbook(file: Path, given: TableForm) -> Contents:
     source = f"{file}, sheet {sheet.name!r}"
     meanings = meanings_of(sheet.meanings.cells, given, source)
     rows = sheets[sheet.name].slice(sheet.header, MOST_ROWS).select(range(len(meanings.cells)))
-    rows = _computed(source, rows, sheet.header + 1, meanings)
-    # The sheet is named in messages
+    rows, first = _computed(source, rows, sheet.header + 1, meanings), sheet.header + 1
+    lines = np.arange(first, first + len(rows))
+    # The sheet is named in messages, and all of its rows are one block
     header = f" with the header in row {sheet.header}" if sheet.header > 1 else ""
     return Contents(
         source=source,
         meanings=meanings,
         names=[given_text(name.strip()) for name in meanings.names],
-        blocks=partial(_sheet_rows, source, rows, sheet.header + 1),
+        blocks=lambda places: iter([RawRows(source, rows.select(list(places)), lines, ())]),
         form=(f"sheet {sheet.name!r}{header}",),
     )
 
@@ -136,13 +138,6 @@ def _computed(source: str, rows: pa.Table, first: int, meanings: Meanings) -> pa
     return rows
 
 
-def _sheet_rows(
-    source: str, rows: pa.Table, first: int, places: Sequence[int]
-) -> Iterator[RawRows]:
-    """Yield the rows of some columns of a sheet, each with its number in the sheet."""
-    yield RawRows(source, rows.select(list(places)), np.arange(first, first + len(rows)), ())
-
-
 def _pair_sheet(file: Path, sheets: Mapping[str, pa.Table], given: TableForm) -> _Sheet:
     """Return the sheet that is named, else the only one that has a pair table."""
     names = [name for name in sheets if given.sheet in (None, name)]
@@ -151,7 +146,7 @@ def _pair_sheet(file: Path, sheets: Mapping[str, pa.Table], given: TableForm) ->
         reason = f"no sheet {given.sheet!r:.60} with cells" if given.sheet else "no sheet has cells"
         raise CatalogError(str(file), f"{reason}; there are {_listed(sheets)}")
     # Of several pair tables the user chooses one
-    whole = [sheet for sheet in tables if is_complete(set(sheet.meanings.names))]
+    whole = [sheet for sheet in tables if not missing_columns(sheet.meanings.names)]
     if len(whole) > 1:
         listed = _listed(sheet.name for sheet in whole)
         mend = f'give sheet = "{whole[0].name}" or another one in [pairs]'

@@ -183,7 +183,7 @@ def read(tmp_path):
         path = tmp_path / "pairs.csv"
         path.write_bytes(("pair_id,gap,note\n" + text).encode())
         blocks = list(row_lines(path, text_form(path, TableForm())))
-        rows = b"".join(block.text for block in blocks).decode().splitlines()
+        rows = "".join(block.text for block in blocks).splitlines()
         numbers = [int(line) for block in blocks for line in block.numbers]
         broken = [(line.row, *line.reasons) for block in blocks for line in block.broken]
         return rows, numbers, broken
