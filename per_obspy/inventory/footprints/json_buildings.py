@@ -191,22 +191,19 @@ def _asset(asset: dict[str, Any], common_units: object) -> _Feature:
     for name in ("Footprint", "units"):
         plain.pop(name, None)
     # Outline, or position, or the reason for the rejection
-    geometry, fault = None, ""
     try:
-        if asset.get("geometry") is not None:
-            geometry = json.dumps(asset["geometry"])
-        elif building.get("Footprint"):
-            geometry = geojson_text(building["Footprint"])
-        else:
-            # A point, which the layer needs to be called one
-            geometry = _point(building)
+        return _Feature(_asset_geometry(asset, building), plain)
     except ValueError as error:
-        fault = str(error)
-    return _Feature(geometry, plain, fault)
+        return _Feature(None, plain, str(error))
 
 
-def _point(building: dict[str, Any]) -> str:
-    """Return the position of a building as GeoJSON."""
+def _asset_geometry(asset: dict[str, Any], building: dict[str, Any]) -> str:
+    """Return the outline of an asset, else its position, as GeoJSON; ValueError without any."""
+    if asset.get("geometry") is not None:
+        return json.dumps(asset["geometry"])
+    if building.get("Footprint"):
+        return geojson_text(building["Footprint"])
+    # A point, which the layer needs to be called one
     place = []
     for name in ("longitude", "latitude"):
         degrees = building.get(name.capitalize(), _member(building.get("location"), name))

@@ -12,9 +12,10 @@ import re
 import sqlite3
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -94,20 +95,7 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     CatalogError
         If the file is missing, or cannot be read as its suffix indicates.
     """
-    suffix, problem = file.suffix.lower(), ""
-    if not file.exists():
-        problem = "no such file"
-    # GDAL knows other suffixes, but not whether they hold outlines
-    elif suffix not in SUFFIXES:
-        problem = f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
-    elif not file.is_file():
-        problem = "is no regular file"
-    elif suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
-        expected = ", ".join(f"{name}.gz" for name in _PACKED)
-        problem = f"unknown suffix {file.name[-20:]!r}, expected {expected}"
-    elif suffix in GDAL_KINDS:
-        problem = _wrong_beginning(file)
-    if problem:
+    if problem := _wrong_file(file):
         raise CatalogError(str(file), problem)
     # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
     # of .osm.pbf (reasoned)
@@ -118,6 +106,22 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
     return raw
+
+
+def _wrong_file(file: Path) -> str:
+    """Return why a file is not read, by its name and its kind; empty if it is."""
+    suffix = file.suffix.lower()
+    if not file.exists():
+        return "no such file"
+    # GDAL knows other suffixes, but not whether they hold outlines
+    if suffix not in SUFFIXES:
+        return f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
+    if not file.is_file():
+        return "is no regular file"
+    if suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
+        expected = ", ".join(f"{name}.gz" for name in _PACKED)
+        return f"unknown suffix {file.name[-20:]!r}, expected {expected}"
+    return _wrong_beginning(file) if suffix in GDAL_KINDS else ""
 
 
 def _wrong_beginning(file: Path) -> str:
@@ -151,6 +155,7 @@ def _read(file: Path, layer: str | None) -> RawLayer:
             is_json = head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
             if suffix in LINES or (suffix == ".csv" and is_json):
                 return read_geojson_lines(plain, source)
+            # Its words tell assets from other JSON
             if suffix in JSON_SUFFIXES and is_asset_json(head):
                 return read_asset_json(plain, source)
             if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
@@ -342,11 +347,18 @@ def _declared_system(file: Path) -> str | None:
 
 
 def _read_geoparquet(file: Path, source: str) -> RawLayer:
-    """Read a GeoParquet file, by the JSON in its metadata."""
+    """Read a GeoParquet file."""
     try:
         table = _without_nesting(pa.parquet.read_table(file.absolute()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(source, unreadable_reason(file, "Parquet table", error)) from error
+    name, crs = _geometry_column(source, table)
+    return _raw_layer(source, table, table.column_names.index(name), crs)
+
+
+def _geometry_column(source: str, table: pa.Table) -> tuple[str, Any]:
+    """Return name and coordinate reference system of the primary geometry column."""
+    # GeoParquet is described by JSON in the metadata
     metadata, problem = table.schema.metadata or {}, "wrong GeoParquet metadata:"
     if b"geo" not in metadata:
         problem = "no GeoParquet metadata: a table of pairs is no layer of footprints"
@@ -364,7 +376,7 @@ def _read_geoparquet(file: Path, source: str) -> RawLayer:
         raise CatalogError(source, problem)
     if kind not in (pa.binary(), pa.large_binary()):
         raise CatalogError(source, f"{problem} column {name} is {kind}, not bytes")
-    return _raw_layer(source, table, table.column_names.index(name), column["crs"])
+    return name, column["crs"]
 
 
 def _without_nesting(table: pa.Table) -> pa.Table:
@@ -374,34 +386,34 @@ def _without_nesting(table: pa.Table) -> pa.Table:
     ``names`` becomes its field ``primary``, ``sources`` the ``dataset`` of its first row, a map, as
     tags are, a text of JSON.
     """
-
-    def text(name: str, cell: Any) -> str | None:
-        if cell is None:
-            return None
-        if name == "names":
-            value = cell["primary"]
-        elif name == "sources":
-            value = cell[0].get("dataset") if cell and isinstance(cell[0], dict) else None
-        else:
-            value = json.dumps(dict(cell))
-        return None if value is None else str(value)
-
     for field in table.schema:
         name, kind = field.name, field.type
         fields = {part.name for part in kind} if pa.types.is_struct(kind) else set()
         # The geometry gives the box anyway
         if fields >= {"xmin", "ymin", "xmax", "ymax"}:
             table = table.drop_columns([name])
-        elif (
-            pa.types.is_map(kind)
-            or (name == "names" and "primary" in fields)
-            or (name == "sources" and pa.types.is_list(kind))
-        ):
-            key = "" if pa.types.is_map(kind) else name
-            texts = [text(key, cell) for cell in table[name].to_pylist()]
-            place = table.column_names.index(name)
-            table = table.set_column(place, name, pa.array(texts, pa.string()))
+            continue
+        if name == "names" and "primary" in fields:
+            value: Callable[[Any], object] = itemgetter("primary")
+        elif name == "sources" and pa.types.is_list(kind):
+            value = _first_dataset
+        elif pa.types.is_map(kind):
+            value = _tags
+        else:
+            continue
+        # As text, whatever the fields are
+        values = [None if cell is None else value(cell) for cell in table[name].to_pylist()]
+        texts = pa.array([None if each is None else str(each) for each in values], pa.string())
+        table = table.set_column(table.column_names.index(name), name, texts)
     return table
+
+
+def _first_dataset(rows: list[Any]) -> object:
+    return rows[0].get("dataset") if rows and isinstance(rows[0], dict) else None
+
+
+def _tags(tags: list[tuple[str, str]]) -> str:
+    return json.dumps(dict(tags))
 
 
 def _raw_layer(source: str, table: pa.Table, outlines: int, crs: Any) -> RawLayer:
