@@ -140,11 +140,7 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
     """
     target, path = Path(index), Path(file)
     entries = stored_inventories(target) if target.exists() else ()
-    if origin.name in [entry.name for entry in entries]:
-        raise CatalogError(str(index), f"name = {origin.name!r} is taken")
-    for field in ("name", "source", "licence"):
-        if not getattr(origin, field).strip():
-            raise CatalogError(str(index), f"{field} of the inventory {str(file)!r} is empty")
+    _check_origin(target, entries, file, origin)
     # An inventory needs at least one usable pair
     pairs = read_pairs(file)
     if pairs.empty:
@@ -166,6 +162,17 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
         texts = [HEADER, *(_toml(each, folder) for each in (*entries, entry))]
         part.write_text("\n".join(texts), encoding="utf-8")
     return entry
+
+
+def _check_origin(
+    index: Path, entries: tuple[StoredInventory, ...], file: str | Path, origin: Origin
+) -> None:
+    """Raise CatalogError if the name of a new inventory is taken, or a text of it is empty."""
+    if origin.name in [entry.name for entry in entries]:
+        raise CatalogError(str(index), f"name = {origin.name!r} is taken")
+    for field in ("name", "source", "licence"):
+        if not getattr(origin, field).strip():
+            raise CatalogError(str(index), f"{field} of the inventory {str(file)!r} is empty")
 
 
 def box_around(longitude: FloatArray, latitude: FloatArray) -> Box:
