@@ -83,21 +83,10 @@ class _Chain(NamedTuple):
 
 def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) -> Chains:
     """
-    Follow the joints from contact to contact, and cut the chains into rows.
+    Follow the joints from contact to contact, and cut the chains into rows, in any order.
 
-    Parameters
-    ----------
-    contacts, joints : Contacts, Joints
-        Contacts and how they are joined.
-    angle : float
-        Largest angle between the axes of two contacts of a row, degrees.
-    longest : int
-        Largest number of buildings of a row.
-
-    Returns
-    -------
-    Chains
-        In any order; every pair that repeats no other is in one of them.
+    The axes of two contacts of a row differ by at most an angle, degrees; ``longest`` is the
+    largest number of its buildings. Every pair that repeats no other is in one row.
     """
     ends, sizes, bits = _rows(contacts, joints.joined, angle, longest)
     # Along the axis, whose azimuth is below 180 degrees
@@ -135,14 +124,8 @@ def _follow(contacts: Contacts, joined: IntArray) -> tuple[IntArray, IntArray, B
     """
     Follow all chains from the end with the smaller name, rings from their first contact.
 
-    Returns
-    -------
-    ends : (n_contacts,) ndarray of int
-        End at which each contact is entered, chain after chain.
-    sizes : (n_chains,) ndarray of int
-        Contacts of each chain.
-    closed : (n_chains,) ndarray of bool
-        Whether it is a ring.
+    Return the end at which each contact is entered, chain after chain, the number of contacts of
+    each chain, and whether it is a ring.
     """
     from scipy.sparse.csgraph import connected_components
 

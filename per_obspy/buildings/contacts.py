@@ -90,18 +90,10 @@ def contacts_of(pairs: pa.Table, angle: float) -> Contacts:
     """
     Return the contacts of a pair table with numbered buildings, without repeated descriptions.
 
-    Parameters
-    ----------
-    pairs : Table
-        With ``pair_id, gap, derived, longitude_i, latitude_i, code_i`` (number of the identifier
-        of building i in alphabetical order, -1 without one), and ``building_id_i, azimuth,
-        facing_length`` where they are known.
-    angle : float
-        Pairs of the same two buildings are one contact if their axes differ by no more, degrees.
-
-    Returns
-    -------
-    Contacts
+    The table has ``pair_id, gap, derived, longitude_i, latitude_i, code_i`` (number of the
+    identifier of building i in alphabetical order, -1 without one), and ``building_id_i, azimuth,
+    facing_length`` where they are known. Pairs of the same two buildings are one contact if their
+    axes differ by no more than an angle, degrees.
     """
     # Buildings and their contacts
     buildings, own, ambiguous, rejected = _number(pairs)
@@ -136,16 +128,10 @@ def _number(
     pairs: pa.Table,
 ) -> tuple[IntArray, BoolArray, BoolArray, list[OrderedRejection]]:
     """
-    Return numbers of buildings 1 and 2, whether each is of its pair only, and the reasons.
+    Return numbers of buildings 1 and 2, (n_pairs, 2), first those with an identifier.
 
-    Returns
-    -------
-    buildings : (n_pairs, 2) ndarray of int
-        In the order of their identifiers, then those that belong to one pair only.
-    own, ambiguous : (n_pairs, 2) ndarray of bool
-        Whether the building belongs to its pair only; because its identifier has several places.
-    rejected : list of OrderedRejection
-        One for each such identifier.
+    Then whether each belongs to its pair only, whether because its identifier has several places,
+    and one rejection for each such identifier.
     """
     codes = _codes(pairs)
     occurring = np.unique(codes[codes >= 0])
@@ -167,14 +153,7 @@ def numbers_in(pairs: pa.Table, name: str) -> FloatArray:
 
 
 class Derived:
-    """
-    Columns of each row of a table that were derived or assumed.
-
-    Parameters
-    ----------
-    texts : (n_rows,) array_like of str
-        Names of columns, separated by spaces.
-    """
+    """Columns of each row of a table that were derived or assumed, from texts of their names."""
 
     def __init__(self, texts: ArrayLike) -> None:
         # Many rows share few texts
@@ -189,21 +168,9 @@ class Derived:
 
 def given_values(pairs: pa.Table, derived: Derived, name: str) -> FloatArray:
     """
-    Return a property of buildings 1 and 2 as far as the table gives it.
+    Return one of ``PROPERTIES`` of buildings 1 and 2 as far as the table gives it, (n_pairs, 2).
 
-    Parameters
-    ----------
-    pairs : Table
-        Completed pairs.
-    derived : Derived
-        Their columns that are not given.
-    name : str
-        One of ``PROPERTIES``.
-
-    Returns
-    -------
-    (n_pairs, 2) ndarray
-        NaN where a value is missing, derived, assumed, or infinite.
+    NaN where a value is missing, derived, assumed, or infinite.
     """
     sides = []
     for i in (1, 2):

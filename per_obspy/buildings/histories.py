@@ -53,23 +53,11 @@ def row_outcomes(
     azimuth: FloatArray,
 ) -> Columns:
     """
-    Compute the outcome of every contact, in its row and for the pair alone.
+    Compute ``OUTCOMES`` of every contact, (n_contacts,) each, in its row and for the pair alone.
 
-    Parameters
-    ----------
-    motion : tuple
-        Acceleration to the north and east, m/s², and the sampling interval, s.
-    contacts : Table
-        Columns ``NEEDED`` and ``turned``, row after row.
-    first : (n_rows + 1,) ndarray of int
-        Place of the first contact of each row, and the end.
-    azimuth : (n_rows,) ndarray
-        Of the axes, degrees.
-
-    Returns
-    -------
-    dict of (n_contacts,) ndarray
-        ``OUTCOMES``; displacements are those of the oscillators, m.
+    The motion is the acceleration to the north and east, m/s², and the sampling interval, s;
+    contacts, ``first`` and azimuth are those of :func:`members_of`. Displacements are those of the
+    oscillators, m.
     """
     members = members_of(contacts, first, azimuth)
     row, alone = row_and_pair_maxima(*motion, members.rows)
@@ -128,22 +116,10 @@ def members_of(contacts: Table, first: IntArray, azimuth: FloatArray) -> Members
     """
     Return the buildings of rows of contacts.
 
-    Parameters
-    ----------
-    contacts : Table
-        Columns ``NEEDED`` of completed pairs, row after row along the axis of each, and
-        ``turned``: whether building 2 comes before building 1.
-    first : (n_rows + 1,) ndarray of int
-        Place of the first contact of each row, and the end.
-    azimuth : (n_rows,) ndarray
-        Of the axes, degrees.
+    Contacts have the columns ``NEEDED`` of completed pairs, row after row along the axis of each
+    (degrees), and ``turned``: whether building 2 comes before building 1. ``first``, (n_rows + 1,),
+    is the place of the first contact of each row, and the end.
 
-    Returns
-    -------
-    Members
-
-    Notes
-    -----
     The modal mass is the contact mass times the square of the participation at that contact, so
     that both pairs of a building share it whatever their contact heights.
     """

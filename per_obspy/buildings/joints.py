@@ -70,21 +70,10 @@ class _Candidates(NamedTuple):
 
 def joints_of(contacts: Contacts, pairs: pa.Table, angle: float) -> Joints:
     """
-    Join the contacts of each building that lie on opposite sides of it.
+    Join the contacts of each building that lie on opposite sides of it, within an angle, degrees.
 
-    Parameters
-    ----------
-    contacts : Contacts
-        Of numbered buildings.
-    pairs : Table
-        Their pairs. Two pairs that differ by more than 1 % in a given property of their building
-        contradict each other.
-    angle : float
-        Largest angle between the axes of two joined contacts, degrees.
-
-    Returns
-    -------
-    Joints
+    Two pairs that differ by more than 1 % in a given property of their building contradict each
+    other.
     """
     candidates, crowded = _candidates(contacts, angle)
     agrees, rejected = _agreement(contacts, candidates, pairs)

@@ -118,18 +118,10 @@ class AllRows(NamedTuple):
 
 def find_rows(pairs: RankedTable, rows: Rows, area: str | None, room: Path) -> AllRows:
     """
-    Find the rows of all pairs, and write their contacts in their order of computation.
+    Find the rows of all pairs of a risk table, and write their contacts into a file in a folder.
 
-    Parameters
-    ----------
-    pairs : RankedTable
-        The risk table.
-    rows : Rows
-        Settings.
-    area : str or None
-        Column of the area of each pair, if areas have names.
-    room : Path
-        Folder for the file.
+    They are in their order of computation. ``area`` is the column of the area of each pair, if
+    areas have names.
     """
     columns = {name: name for name in (*FINDING, *CARRIED)} | ({AREA: area} if area else {})
     found = list[PieceRows]()
@@ -170,19 +162,9 @@ def _contacts(
 
 def number_buildings(pairs: RankedTable, database: duckdb.DuckDBPyConnection) -> NDArray[np.int32]:
     """
-    Return the place of the identifiers of each pair in their alphabetical order.
+    Return the place of the identifiers of each pair in their alphabetical order, (n_pairs, 2).
 
-    Parameters
-    ----------
-    pairs : RankedTable
-        The risk table; ``building_id_1`` and ``building_id_2`` may be absent.
-    database : DuckDBPyConnection
-        Of bounded memory.
-
-    Returns
-    -------
-    (n_pairs, 2) ndarray of int
-        -1 for a building without an identifier.
+    It is -1 for a building without an identifier.
     """
     codes = np.full((pairs.pairs, 2), -1, dtype=np.int32)
     database.register("ends", pa.RecordBatchReader.from_batches(_ENDS, _ends(pairs)))
@@ -218,12 +200,8 @@ def piece_numbers(codes: NDArray[np.int32], size: int) -> NDArray[np.int32]:
     """
     Return the number of the piece of each pair: pairs that share a building are in one piece.
 
-    Parameters
-    ----------
-    codes : (n_pairs, 2) ndarray of int
-        From :func:`number_buildings`.
-    size : int
-        Pairs of a piece, about; connected pairs are in one piece however many they are.
+    Codes are those of :func:`number_buildings`. A piece has about ``size`` pairs, but connected
+    pairs are in one however many they are.
 
     Examples
     --------
@@ -307,22 +285,11 @@ class PieceRows(NamedTuple):
 
 def find_in_piece(pairs: pa.Table, rows: Rows) -> tuple[pa.Table, PieceRows]:
     """
-    Find the rows of connected pairs.
+    Find the rows of connected pairs: their contacts, and what else is found.
 
-    Parameters
-    ----------
-    pairs : Table
-        Columns ``FINDING`` and ``CARRIED``, as far as they are known, ``code_1`` and ``code_2``.
-    rows : Rows
-        Settings.
-
-    Returns
-    -------
-    contacts : Table
-        One row per contact, along each row: the columns ``CARRIED`` and those of the row; for a
-        building of one pair only -1 - its end is the number.
-    found : PieceRows
-        What else is found.
+    Pairs have the columns ``FINDING`` and ``CARRIED``, as far as they are known, ``code_1`` and
+    ``code_2``; contacts, along each row, ``CARRIED`` and the columns of the row. The number of a
+    building of one pair only is -1 - its end.
     """
     contacts = contacts_of(pairs, rows.angle)
     joints = joints_of(contacts, pairs, rows.angle)
@@ -344,12 +311,7 @@ def served_buildings(station: pd.Series, buildings: IntArray) -> Counter[str]:
     """
     Return the number of buildings in whose pairs the record of each station is used.
 
-    Parameters
-    ----------
-    station : (n_pairs,) Series of str
-        Name of the station of each pair, empty for none.
-    buildings : (n_pairs, 2) ndarray of int
-        Numbers of the buildings of each pair.
+    Of each pair: the name of its station, empty for none, and the numbers of its two buildings.
 
     Examples
     --------
@@ -420,23 +382,8 @@ def serving_stations(
     Return the station of each row: that which serves most of its pairs.
 
     Of several that serve equally many it is the one nearer to its pairs, then the first by name. It
-    is empty where most pairs have none.
-
-    Parameters
-    ----------
-    row : (n_pairs,) ndarray of int
-        Number of the row of each pair, from 0.
-    station : (n_pairs,) ndarray of str
-        Station of each pair; empty for none.
-    distance : (n_pairs,) ndarray
-        From the pair to its station, m.
-
-    Returns
-    -------
-    station : (n_rows,) ndarray of str
-        Names.
-    several : (n_rows,) ndarray of bool
-        Whether pairs of the row are served by different stations.
+    is empty where most pairs have none. Also return whether different stations serve the row. Of
+    each pair: number of its row from 0, name of its station, and the distance to it, m.
     """
     pairs = pd.DataFrame({"row": row, "station": station, "distance": distance})
     groups = pairs.groupby(["row", "station"])["distance"].agg(["size", "sum"]).reset_index()
@@ -477,11 +424,6 @@ def chunks_of(file: Path) -> Iterator[pa.Table]:
     Yield the contacts of each chunk, with the columns ``OF_CHUNKS``.
 
     A chunk has whole rows of one station, and ``CHUNK`` contacts at most if these are several rows.
-
-    Parameters
-    ----------
-    file : Path
-        From :func:`find_rows`.
     """
     waiting, contacts, last = list[pa.Table](), 0, ""
     for table in _groups(file):

@@ -42,20 +42,9 @@ BoolArray = NDArray[np.bool_]
 
 def directions(azimuth: ArrayLike, flags: ArrayLike) -> dict[str, FloatArray]:
     """
-    Return the directions towards the neighbours on both sides of interfaces.
+    Return the directions from the building on each side of interfaces to the other one, degrees.
 
-    Parameters
-    ----------
-    azimuth : (n,) array_like
-        Of the axes of the rows, from their first to their last buildings, degrees.
-    flags : (n,) array_like of str
-        Flags of the rows.
-
-    Returns
-    -------
-    dict of (n,) ndarray
-        ``direction_left`` (of the building on the left) and ``direction_right``, degrees; NaN if
-        the axis is unknown.
+    They are NaN if the axis of the row, from its first to its last building, is unknown.
     """
     # Many rows share few texts
     codes, texts = pd.factorize(np.asarray(flags, dtype=object))
@@ -66,12 +55,9 @@ def directions(azimuth: ArrayLike, flags: ArrayLike) -> dict[str, FloatArray]:
 
 class Sides:
     """
-    Sides of buildings, all of a building one after the other, and reductions to buildings.
+    Sides of buildings, and reductions to buildings.
 
-    Parameters
-    ----------
-    table : DataFrame
-        With ``building_number``, which never falls.
+    Their ``building_number`` never falls, so that all sides of a building are together.
     """
 
     def __init__(self, table: pd.DataFrame) -> None:

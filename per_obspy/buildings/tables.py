@@ -72,16 +72,9 @@ def write_rows_part(interfaces: Mapping[str, Any], path: Path) -> None:
 
 def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) -> list[Path]:
     """
-    Write ``rows.parquet`` and ``rows.columns.csv``.
+    Write ``rows.parquet``, which states facts of the whole table, and ``rows.columns.csv``.
 
-    Parameters
-    ----------
-    parts : sequence of Path
-        From :func:`write_rows_part`, in their order.
-    folder : Path
-        Folder of the files.
-    facts : mapping of str to str
-        Facts of the whole table that the Parquet file states.
+    Parts are those of :func:`write_rows_part`, in their order.
     """
     files = [folder / "rows.parquet", folder / "rows.columns.csv"]
     tables = (pq.ParquetFile(part.absolute()).read(use_threads=False) for part in parts)
@@ -111,20 +104,10 @@ def write_buildings(
     folder: Path, contacts: Path, settings: Run, facts: Mapping[str, str]
 ) -> list[Path]:
     """
-    Write ``buildings.parquet``, ``buildings.csv`` and ``buildings.columns.csv``.
+    Write ``buildings.parquet``, ``buildings.csv`` (the worst) and ``buildings.columns.csv``.
 
-    Parameters
-    ----------
-    folder : Path
-        With ``rows.parquet``.
-    contacts : Path
-        Parquet file of the columns ``OF_PAIRS`` and those of the areas, as far as they are known,
-        in the order of ``rows.parquet``.
-    settings : Run
-        Classes, areas, the angle between rows of a corner, and the number of buildings in
-        ``buildings.csv``, the worst ones.
-    facts : mapping of str to str
-        Facts of the whole table that the Parquet file states.
+    The folder has ``rows.parquet``; contacts, in the same order, the columns ``OF_PAIRS`` and that
+    of the areas, as far as they are known. The Parquet file states facts of the whole table.
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
@@ -160,13 +143,10 @@ def _sides(
 
 def sides_query(names: Sequence[str]) -> str:
     """
-    Return the query of both sides of interfaces, ordered by their buildings.
+    Return the query of both sides of a table ``interfaces``, ordered by their buildings.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Columns of a table ``interfaces``. Those that end in ``_left`` and ``_right``, and those in
-        ``_1`` and ``_2`` of the pair, become one column of the building of each side.
+    Columns that end in ``_left`` and ``_right``, and those in ``_1`` and ``_2`` of the pair, become
+    one column of the building of each side.
     """
     columns = []
     for name in names:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from pydantic import Field
 
 from per_obspy import config
@@ -51,6 +50,11 @@ class Box(NamedTuple):
     south: float
     east: float
     north: float
+
+    @property
+    def width(self) -> float:
+        """Range of longitudes, degrees: 360 for the whole Earth, not its remainder 0."""
+        return self.east - self.west + (360.0 if self.west > self.east else 0.0)
 
 
 class StoredInventory(config.Section):
@@ -134,7 +138,7 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
     CatalogError
         If the inventory has no usable row, the name is taken, or name, source or licence is empty.
     """
-    target = Path(index)
+    target, path = Path(index), Path(file)
     entries = stored_inventories(target) if target.exists() else ()
     _check_origin(target, entries, file, origin)
     # An inventory needs at least one usable pair
@@ -143,17 +147,20 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
         reasons = "; ".join(pairs.attrs["rejected"][0].reasons)
         raise CatalogError(str(file), f"no usable row: {reasons}")
     # Contents and hash of the file
+    places = [pairs[[f"{name}_1", f"{name}_2"]].to_numpy() for name in ("longitude", "latitude")]
     entry = StoredInventory(
-        name=origin.name,
-        file=Path(file).resolve(),
-        bounding_box=bounding_box(pairs),
-        sha256=file_hash(Path(file)),
+        **origin._asdict(),
+        file=path.resolve(),
+        bounding_box=box_around(*places),
+        crs=CRS,
+        sha256=file_hash(path),
         pairs=len(pairs),
-        source=origin.source,
-        licence=origin.licence,
-        date=origin.date,
     )
-    _write(target, (*entries, entry))
+    # The whole index, whose files are relative to its folder
+    folder = target.resolve().parent
+    with written_whole(target) as part:
+        texts = [HEADER, *(_toml(each, folder) for each in (*entries, entry))]
+        part.write_text("\n".join(texts), encoding="utf-8")
     return entry
 
 
@@ -168,25 +175,13 @@ def _check_origin(
             raise CatalogError(str(index), f"{field} of the inventory {str(file)!r} is empty")
 
 
-def bounding_box(pairs: pd.DataFrame) -> Box:
-    """Return the smallest box around all buildings of a pair table, across the date line or not."""
-    latitude = pairs[["latitude_1", "latitude_2"]].to_numpy()
-    longitude = pairs[["longitude_1", "longitude_2"]].to_numpy()
-    return _box_around(longitude, latitude)
-
-
-def _box_around(longitude: FloatArray, latitude: FloatArray) -> Box:
-    """Return the smallest box around positions in degrees."""
+def box_around(longitude: FloatArray, latitude: FloatArray) -> Box:
+    """Return the smallest box around positions in degrees, across the date line or not."""
     # The box begins after the widest range of longitudes without a position
-    sorted_longitude = np.unique(longitude)
-    empty = np.diff(sorted_longitude, append=sorted_longitude[0] + 360.0)
-    widest = int(empty.argmax())
-    return Box(
-        west=float(sorted_longitude[(widest + 1) % sorted_longitude.size]),
-        south=float(latitude.min()),
-        east=float(sorted_longitude[widest]),
-        north=float(latitude.max()),
-    )
+    east = np.unique(longitude)
+    widest = int(np.diff(east, append=east[0] + 360.0).argmax())
+    west = float(east[(widest + 1) % east.size])
+    return Box(west, float(latitude.min()), float(east[widest]), float(latitude.max()))
 
 
 def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach: float) -> Box:
@@ -195,13 +190,13 @@ def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach
 
     Near a pole it has the width of the whole Earth.
     """
-    box = _box_around(np.array(longitudes), np.array(latitudes))
+    box = box_around(np.array(longitudes), np.array(latitudes))
     degrees = reach / METRES_PER_DEGREE
     south, north = max(box.south - degrees, -90.0), min(box.north + degrees, 90.0)
     # Degrees of longitude are shortest at the latitude farthest from the equator
     cosine = float(np.cos(np.radians(max(abs(south), abs(north)))))
     widened = degrees / max(cosine, SMALLEST_COSINE)
-    if _width(box) + 2.0 * widened >= 360.0:
+    if box.width + 2.0 * widened >= 360.0:
         return Box(-180.0, south, 180.0, north)
     # Longitudes between -180 and 180 degrees
     west = (box.west - widened + 540.0) % 360.0 - 180.0
@@ -212,13 +207,8 @@ def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach
 def touch(first: Box, second: Box) -> bool:
     """Return whether two boxes have a point in common."""
     east, west = (second.west - first.west) % 360.0, (first.west - second.west) % 360.0
-    longitudes_overlap = east <= _width(first) or west <= _width(second)
+    longitudes_overlap = east <= first.width or west <= second.width
     return longitudes_overlap and first.south <= second.north and second.south <= first.north
-
-
-def _width(box: Box) -> float:
-    """Return the range of longitudes in degrees: 360 for the whole Earth, not its remainder 0."""
-    return box.east - box.west + (360.0 if box.west > box.east else 0.0)
 
 
 def find_inventories(index: str | Path, region: Box) -> tuple[StoredInventory, ...]:
@@ -239,16 +229,11 @@ def find_inventories(index: str | Path, region: Box) -> tuple[StoredInventory, .
     ValueError
         If the region is no box in degrees.
     """
-    _check_region(region)
-    return tuple(entry for entry in stored_inventories(index) if touch(entry.bounding_box, region))
-
-
-def _check_region(region: Box) -> None:
-    """Raise ValueError if a region is no box in degrees."""
     values = np.abs(np.array(region, dtype=np.float64))
     if not (values <= DEGREES).all() or region.south > region.north:
         edges = ", ".join(map(str, region))
         raise ValueError(f"region must be west, south, east, north in degrees, got {edges}")
+    return tuple(entry for entry in stored_inventories(index) if touch(entry.bounding_box, region))
 
 
 def verified_file(entry: StoredInventory) -> Path:
@@ -263,10 +248,10 @@ def verified_file(entry: StoredInventory) -> Path:
     if not entry.file.is_file():
         raise CatalogError(str(entry.file), f"the stored inventory {entry.name!r} is missing")
     # Any other byte gives another hash
-    found = file_hash(entry.file)
-    if found != entry.sha256:
+    own = file_hash(entry.file)
+    if own != entry.sha256:
         problem = f"changed or damaged since it was stored as {entry.name!r}"
-        hashes = f"sha256 {found}, expected {entry.sha256}"
+        hashes = f"sha256 {own}, expected {entry.sha256}"
         raise CatalogError(str(entry.file), f"{problem} ({hashes})")
     return entry.file
 
@@ -280,14 +265,6 @@ def check_inventories(index: str | Path) -> tuple[Rejection, ...]:
         except CatalogError as error:
             faults.append(Rejection("file", entry.name, str(entry.file), None, (error.problem,)))
     return tuple(faults)
-
-
-def _write(index: Path, entries: tuple[StoredInventory, ...]) -> None:
-    """Write the whole index."""
-    folder = index.resolve().parent
-    blocks = [HEADER, *(_toml(entry, folder) for entry in entries)]
-    with written_whole(index) as part:
-        part.write_text("\n".join(blocks), encoding="utf-8")
 
 
 def _toml(entry: StoredInventory, folder: Path) -> str:

@@ -108,8 +108,7 @@ def simulated_pairs(
     checks.positive("radius", radius)
     checks.between("touching", touching, 0, 1)
     # The order of the random numbers belongs to the seed
-    generator = np.random.default_rng(seed)
-    rows = _rows(seed, count)
+    generator, rows = np.random.default_rng(seed), _rows(seed, count)
     columns = _buildings(generator, rows)
     columns["gap"] = _gaps(generator, count, touching)
     columns |= _places(generator, columns, rows, np.column_stack([east, north]), radius)
@@ -139,46 +138,39 @@ def _names(rows: _Rows) -> Columns:
     """Return identifiers of pairs and buildings, and whether a pair is at the end of its row."""
     # Each pair has a new building 2, and the first pair of each row a new building 1
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
+    numbers = {
+        "pair_id": np.arange(last.size) + 1,
+        "building_id_1": last - 1,
+        "building_id_2": last,
+    }
     straight = rows.goes_on & ~rows.turns
     inside = straight & np.append(straight[1:], False)
-    return {
-        "pair_id": _identifiers("P", np.arange(1, last.size + 1)),
-        "building_id_1": _identifiers("B", last - 1),
-        "building_id_2": _identifiers("B", last),
-        "position": np.where(inside, POSITIONS[1], POSITIONS[0]),
-    }
-
-
-def _identifiers(letter: str, numbers: NDArray[np.int64]) -> NDArray[np.str_]:
-    return np.array([f"{letter}{number:07d}" for number in numbers.tolist()])
+    names: Columns = {"position": np.where(inside, POSITIONS[1], POSITIONS[0])}
+    for name, number in numbers.items():
+        letter = name[0].upper()
+        names[name] = np.array([f"{letter}{each:07d}" for each in number.tolist()])
+    return names
 
 
 def _lognormal(
     generator: np.random.Generator, count: int, median: float, log_std: float
 ) -> FloatArray:
     """Return (2, count) lognormal numbers, one row per building of the pair."""
-    values: FloatArray = median * np.exp(log_std * generator.standard_normal((2, count)))
-    return values
+    return np.asarray(median * np.exp(log_std * generator.standard_normal((2, count))))
 
 
 def _buildings(generator: np.random.Generator, rows: _Rows) -> Columns:
     """Return sizes, systems, measured periods and dampings of both buildings of each pair."""
     count = rows.start.size
-    storeys, height, system = _sizes(generator, rows)
-    area = np.round(_lognormal(generator, count, *AREA))
+    buildings = _sizes(generator, rows)
+    buildings["area"] = np.round(_lognormal(generator, count, *AREA))
     # Measured values, NaN where the building was not measured
     is_measured = generator.random((2, count)) < MEASURED
     scatter = _lognormal(generator, count, 1.0, PERIOD_SCATTER)
-    period = np.round(asce7_period(height, system) * scatter, 3)
+    period = np.round(asce7_period(buildings["height"], buildings["system"]) * scatter, 3)
     damping = np.round(generator.uniform(*DAMPINGS, (2, count)), 3)
-    buildings = {
-        "storeys": storeys,
-        "height": height,
-        "system": system,
-        "area": area,
-        "period": np.where(is_measured, period, np.nan),
-        "damping": np.where(is_measured, damping, np.nan),
-    }
+    buildings["period"] = np.where(is_measured, period, np.nan)
+    buildings["damping"] = np.where(is_measured, damping, np.nan)
     # Building 1 of a pair that goes on is building 2 of the one before
     on = np.flatnonzero(rows.goes_on)
     for values in buildings.values():
@@ -186,12 +178,8 @@ def _buildings(generator: np.random.Generator, rows: _Rows) -> Columns:
     return {f"{name}_{i}": values[i - 1] for name, values in buildings.items() for i in (1, 2)}
 
 
-def _sizes(generator: np.random.Generator, rows: _Rows) -> tuple[FloatArray, FloatArray, Any]:
-    """
-    Return storeys, heights in m and systems, (2, count) each.
-
-    Building 2 often repeats the size or the system of building 1.
-    """
+def _sizes(generator: np.random.Generator, rows: _Rows) -> Columns:
+    """Return storeys, heights, m, and systems, (2, count) each; building 2 often repeats them."""
     count = rows.start.size
     storeys = np.clip(np.rint(_lognormal(generator, count, *STOREYS)), 1, MOST_STOREYS)
     storey_height = np.round(generator.normal(*STOREY_HEIGHT, (2, count)), 1)
@@ -206,7 +194,7 @@ def _sizes(generator: np.random.Generator, rows: _Rows) -> tuple[FloatArray, Flo
         chosen = np.where(rows.goes_on & is_alike, 0, np.arange(count))
         origin = np.maximum.accumulate(chosen)
         values[1] = np.where(is_alike[origin], values[0, origin], values[1, origin])
-    return storeys, (storeys * storey_height).round(1), system
+    return {"storeys": storeys, "height": (storeys * storey_height).round(1), "system": system}
 
 
 def _gaps(generator: np.random.Generator, count: int, touching: float) -> FloatArray:
@@ -236,19 +224,17 @@ def _places(
     steps = (half_sides + columns["gap"]) * _direction(np.deg2rad(azimuth))
     places = {"azimuth": azimuth}
     for i, offset in enumerate(_offsets(first, steps, rows, radius), start=1):
-        longitude, latitude = _move(*stations[station].T, *offset)
-        places |= {f"longitude_{i}": longitude, f"latitude_{i}": latitude}
+        places[f"longitude_{i}"], places[f"latitude_{i}"] = _move(stations[station], offset)
     return places
 
 
-def _move(
-    longitude: FloatArray, latitude: FloatArray, east: FloatArray, north: FloatArray
-) -> FloatArray:
-    """Return places a few kilometres (m) to the east and north, degrees, Earth as flat."""
-    northward = latitude + north / METRES_PER_DEGREE
-    eastward = longitude + east / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
+def _move(place: FloatArray, offset: FloatArray) -> FloatArray:
+    """Return places, degrees (count, 2), moved east and north, m (2, count), Earth as flat."""
+    longitude, latitude = place.T
+    degrees = longitude + offset[0] / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
     # Longitudes between -180 and 180 degrees
-    return np.round([(eastward + 180.0) % 360.0 - 180.0, northward], 7)
+    northward = latitude + offset[1] / METRES_PER_DEGREE
+    return np.round([(degrees + 180.0) % 360.0 - 180.0, northward], 7)
 
 
 def _direction(azimuth: FloatArray) -> FloatArray:
@@ -260,8 +246,7 @@ def _offsets(
     first: FloatArray, steps: FloatArray, rows: _Rows, radius: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return buildings 1 and 2 of all pairs from their stations, (2, count) each, m."""
-    ends = np.cumsum(steps, axis=1)
-    begins = ends - steps
+    begins = np.cumsum(steps, axis=1) - steps
     one = first + begins - begins[:, rows.start]
     # A row that would leave the disc is moved towards its station
     starts = np.flatnonzero(~rows.goes_on)

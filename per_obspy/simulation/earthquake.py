@@ -50,41 +50,24 @@ PLASTIC = 1.3247179572447458
 
 
 class Simulation(NamedTuple):
-    """
-    A simulated event with its records.
+    """A simulated event with its records."""
 
-    Attributes
-    ----------
-    stream : Stream
-        Raw counts, three components per station.
-    inventory : Inventory
-        Station metadata with response.
-    event : Event
-        Origin and magnitude.
-    """
-
+    #: Raw counts, three components per station.
     stream: Stream
+    #: Station metadata with response.
     inventory: Inventory
+    #: Origin and magnitude.
     event: Event
 
 
 class SimulatedStation(NamedTuple):
-    """
-    A station of the scenario.
-
-    Attributes
-    ----------
-    code : str
-        Station code.
-    latitude, longitude : float
-        Degrees.
-    lakebed : float or None
-        Frequency of the lakebed under it, Hz; None on rock.
-    """
+    """A station of the scenario."""
 
     code: str
+    #: Degrees.
     latitude: float
     longitude: float
+    #: Frequency of the lakebed under it, Hz; None on rock.
     lakebed: float | None
 
 
@@ -194,24 +177,17 @@ def _records(
     scenario: Scenario, number: int, station: SimulatedStation, inventory: Inventory
 ) -> list[Trace]:
     """Return the records of a station, counts; they begin before the P waves."""
-    epicentral, _, _ = gps2dist_azimuth(
-        scenario.latitude, scenario.longitude, station.latitude, station.longitude
-    )
-    distance = float(np.hypot(epicentral, scenario.depth))
+    places = scenario.latitude, scenario.longitude, station.latitude, station.longitude
+    distance = float(np.hypot(gps2dist_azimuth(*places)[0], scenario.depth))
     p_wave = UTCDateTime(scenario.origin_time) + distance / (P_VELOCITY * scenario.shear_velocity)
-    header = {
-        "network": NETWORK,
-        "station": station.code,
-        "delta": scenario.dt,
-        "starttime": p_wave - scenario.pre_event,
-    }
+    start = p_wave - scenario.pre_event
+    header = {"network": NETWORK, "station": station.code, "delta": scenario.dt, "starttime": start}
     # One trace per component
     motion = _acceleration(scenario, number, station, distance)
-    traces = []
-    for channel, samples in zip(CHANNELS, motion, strict=True):
-        counts = Trace(np.rint(GAIN * samples), header | {"channel": channel})
-        traces.append(with_metadata(counts, inventory))
-    return traces
+    return [
+        with_metadata(Trace(np.rint(GAIN * samples), header | {"channel": channel}), inventory)
+        for channel, samples in zip(CHANNELS, motion, strict=True)
+    ]
 
 
 def _acceleration(
@@ -232,7 +208,7 @@ def _acceleration(
     for arrival, amplitude in ((scenario.pre_event, P_AMPLITUDE), (s_wave, 1.0)):
         delay = round(arrival / scenario.dt)
         shape = np.concatenate([np.zeros(delay), window[: n_padded - delay]])
-        noise = _correlated_noise(generator, n_padded, scenario.correlation)
+        noise = _noise(generator, n_padded, scenario.correlation)
         wave = stochastic.shaped_noise(noise, shape, spectra, scenario.dt)
         motion += amplitude * wave[:, :n_samples]
     return motion
@@ -246,9 +222,7 @@ def _n_samples(scenario: Scenario, station: SimulatedStation, s_wave: float, sha
     return int(np.ceil(lasts / scenario.dt))
 
 
-def _correlated_noise(
-    generator: np.random.Generator, n_samples: int, correlation: float
-) -> FloatArray:
+def _noise(generator: np.random.Generator, n_samples: int, correlation: float) -> FloatArray:
     """Return three rows of noise of which the first two are correlated."""
     north, east, up = generator.standard_normal((3, n_samples))
     return np.stack([north, correlation * north + np.sqrt(1.0 - correlation**2) * east, up])
@@ -296,21 +270,14 @@ def scenario_inventory(scenario: Scenario, stations: list[SimulatedStation]) -> 
 def _station_metadata(scenario: Scenario, station: SimulatedStation) -> stationxml.Station:
     """Return a station with three channels: no poles, no zeros, one gain."""
     place = {"latitude": station.latitude, "longitude": station.longitude, "elevation": 0.0}
-    channels = [
-        stationxml.Channel(
-            code,
-            "",
-            **place,
-            depth=0.0,
-            azimuth=azimuth,
-            dip=dip,
-            sample_rate=1.0 / scenario.dt,
-            response=stationxml.Response.from_paz(
-                [], [], GAIN, input_units="M/S**2", output_units="COUNTS"
-            ),
+    channels = []
+    for code, (azimuth, dip) in CHANNELS.items():
+        channel = stationxml.Channel(code, "", **place, depth=0.0, azimuth=azimuth, dip=dip)
+        channel.sample_rate = 1.0 / scenario.dt
+        channel.response = stationxml.Response.from_paz(
+            [], [], GAIN, input_units="M/S**2", output_units="COUNTS"
         )
-        for code, (azimuth, dip) in CHANNELS.items()
-    ]
+        channels.append(channel)
     # The records module reads the site class from a comment
     soil = "rock" if station.lakebed is None else "lakebed"
     return stationxml.Station(
@@ -332,31 +299,28 @@ def scenario_event(scenario: Scenario) -> Event:
     time = UTCDateTime(scenario.origin_time)
     created = quakeml.CreationInfo(agency_id="per_obspy", author="simulated", creation_time=time)
     # The origin and the magnitude, each preferred
+    name = quakeml.EventDescription(f"{scenario.name} (simulated)", "earthquake name")
+    preferred_origin = quakeml.Origin(
+        resource_id=origin,
+        time=time,
+        latitude=scenario.latitude,
+        longitude=scenario.longitude,
+        depth=scenario.depth,
+        creation_info=created,
+    )
+    preferred_magnitude = quakeml.Magnitude(
+        resource_id=magnitude,
+        mag=scenario.magnitude,
+        magnitude_type="Mw",
+        origin_id=origin,
+        creation_info=created,
+    )
     return Event(
         resource_id=event,
-        event_descriptions=[
-            quakeml.EventDescription(f"{scenario.name} (simulated)", "earthquake name")
-        ],
+        event_descriptions=[name],
         comments=[quakeml.Comment(text=NOTICE, resource_id=comment)],
-        origins=[
-            quakeml.Origin(
-                resource_id=origin,
-                time=time,
-                latitude=scenario.latitude,
-                longitude=scenario.longitude,
-                depth=scenario.depth,
-                creation_info=created,
-            )
-        ],
-        magnitudes=[
-            quakeml.Magnitude(
-                resource_id=magnitude,
-                mag=scenario.magnitude,
-                magnitude_type="Mw",
-                origin_id=origin,
-                creation_info=created,
-            )
-        ],
+        origins=[preferred_origin],
+        magnitudes=[preferred_magnitude],
         preferred_origin_id=origin,
         preferred_magnitude_id=magnitude,
         creation_info=created,

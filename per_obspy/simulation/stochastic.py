@@ -96,8 +96,7 @@ def source_spectrum(
     low = (1.0 - source.high_share) / (1.0 + (frequency / source.low_corner) ** 2)
     high = source.high_share / (1.0 + (frequency / source.high_corner) ** 2)
     displacement = constant * seismic_moment(magnitude) * (low + high)
-    spectrum: FloatArray = (2.0 * np.pi * frequency) ** 2 * displacement
-    return spectrum
+    return np.asarray((2.0 * np.pi * frequency) ** 2 * displacement)
 
 
 def path_spectrum(
@@ -114,8 +113,7 @@ def path_spectrum(
     """
     factor = np.maximum(frequency, 1e-6) ** (1.0 - quality_exponent)
     spreading = 1.0 / distance if distance < CROSSOVER else 1.0 / np.sqrt(distance * CROSSOVER)
-    path: FloatArray = spreading * np.exp(-np.pi * factor * distance / (quality * shear_velocity))
-    return path
+    return np.asarray(spreading * np.exp(-np.pi * factor * distance / (quality * shear_velocity)))
 
 
 def rock_response(frequency: FloatArray, kappa: float) -> FloatArray:
@@ -123,8 +121,7 @@ def rock_response(frequency: FloatArray, kappa: float) -> FloatArray:
     amplification = np.interp(
         np.log(np.maximum(frequency, 1e-6)), np.log(ROCK_FREQUENCY), ROCK_AMPLIFICATION
     )
-    response: FloatArray = amplification * np.exp(-np.pi * kappa * frequency)
-    return response
+    return np.asarray(amplification * np.exp(-np.pi * kappa * frequency))
 
 
 def kanai_tajimi(frequency: FloatArray, natural: float, damping: float) -> NDArray[np.complex128]:
@@ -150,8 +147,7 @@ def saragoni_hart_window(n_samples: int, dt: float, shaking: float) -> FloatArra
     """Compute the Saragoni-Hart window of a duration in s; its maximum is 1."""
     power = -WINDOW_PEAK * np.log(WINDOW_END) / (1.0 + WINDOW_PEAK * (np.log(WINDOW_PEAK) - 1.0))
     time = np.arange(n_samples) * dt / (WINDOW_STRETCH * shaking)
-    shape: FloatArray = (math.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time)
-    return shape
+    return np.asarray((math.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time))
 
 
 def shaped_noise(
@@ -160,50 +156,23 @@ def shaped_noise(
     """
     Compute acceleration in m/s2 with the shape of a window and, on average, a spectrum.
 
-    Parameters
-    ----------
-    noise : (n_components, n_samples) ndarray
-        Gaussian noise; its phase is that of the result.
-    shape : (n_samples,) ndarray
-        Window in time.
-    spectrum : (n_components, n_samples // 2 + 1) ndarray
-        Fourier spectrum of the result at the frequencies of ``rfft``, m/s.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    acceleration : (n_components, n_samples) ndarray
-        m/s2.
+    Noise is (n_components, n_samples), Gaussian, with the phase of the result; the spectrum, m/s,
+    (n_components, n_samples // 2 + 1), that at the frequencies of ``rfft`` for a step dt in s.
     """
     transform = fft.rfft(noise * shape)
     transform /= np.sqrt(np.mean(np.abs(transform) ** 2, axis=-1, keepdims=True))
-    acceleration: FloatArray = fft.irfft(transform * spectrum, n=noise.shape[-1]) / dt
-    return acceleration
+    return np.asarray(fft.irfft(transform * spectrum, n=noise.shape[-1]) / dt)
 
 
 def log_variation(
     generator: np.random.Generator, place: tuple[float, float], reach: float, frequency: FloatArray
 ) -> FloatArray:
     """
-    Compute the standard normal random field at a place.
+    Compute the standard normal random field at a place (east and north of a fixed point, m).
 
-    Parameters
-    ----------
-    generator : Generator
-        Random numbers of the field: those of every place of an earthquake in the same state.
-    place : (float, float)
-        East and north of any fixed point, m.
-    reach : float
-        Distance at which the correlation has fallen to 0.05, m (``exp(-3 h / reach)``, as Jayaram &
-        Baker 2009 define it).
-    frequency : (n,) ndarray
-        Hz.
-
-    Returns
-    -------
-    variation : (n,) ndarray
-        Dimensionless, of mean 0 and standard deviation 1 over all fields.
+    The generator is in the same state for every place of an earthquake. At the distance ``reach``,
+    m, the correlation has fallen to 0.05 (``exp(-3 h / reach)``, as Jayaram & Baker 2009 define
+    it). The result, (n,), is dimensionless, one number for each frequency, Hz.
     """
     share, direction, slope, phase = generator.random((4, WAVES))
     at_place = _numbers_in_the_plane(share, direction, reach) @ np.array(place)
@@ -214,9 +183,7 @@ def log_variation(
     waves = np.cos(at_place[:, None] + along[:, None] * nodes + 2.0 * np.pi * phase[:, None])
     # The sum at the nodes, then between them
     field = np.sqrt(2.0 / WAVES) * waves.sum(axis=0)
-    logs = np.log(np.clip(frequency, *FREQUENCIES))
-    variation: FloatArray = np.interp(logs, nodes, field)
-    return variation
+    return np.asarray(np.interp(np.log(np.clip(frequency, *FREQUENCIES)), nodes, field))
 
 
 def _numbers_in_the_plane(share: FloatArray, direction: FloatArray, reach: float) -> FloatArray:

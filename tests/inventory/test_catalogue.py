@@ -3,7 +3,7 @@
 import datetime
 from pathlib import Path
 
-import pandas as pd
+import numpy as np
 import pytest
 
 from per_obspy.errors import CatalogError
@@ -11,7 +11,7 @@ from per_obspy.inventory.catalogue import (
     Box,
     Origin,
     add_inventory,
-    bounding_box,
+    box_around,
     check_inventories,
     find_inventories,
     stored_inventories,
@@ -109,17 +109,16 @@ def test_boxes_touch_both_ways_round(first, second, expected):
     assert touch(Box(*second), Box(*first)) is expected
 
 
-def test_bounding_box_across_the_date_line():
-    pairs = pd.DataFrame({"longitude_1": [179.9, -179.8], "longitude_2": [179.95, -179.7]})
-    pairs = pairs.assign(latitude_1=[1.0, 2.0], latitude_2=[1.5, 3.0])
-    assert bounding_box(pairs) == (179.9, 1.0, -179.7, 3.0)
-
-
-def test_a_bounding_box_of_one_place():
-    pairs = pd.DataFrame(
-        {"longitude_1": [5.0], "longitude_2": [5.0], "latitude_1": [1.0], "latitude_2": [1.0]}
-    )
-    assert bounding_box(pairs) == (5.0, 1.0, 5.0, 1.0)
+@pytest.mark.parametrize(
+    ("longitudes", "latitudes", "box"),
+    [
+        ([179.9, -179.8, 179.95, -179.7], [1.0, 2.0, 1.5, 3.0], (179.9, 1.0, -179.7, 3.0)),
+        ([5.0, 5.0], [1.0, 1.0], (5.0, 1.0, 5.0, 1.0)),
+    ],
+    ids=["date line", "one place"],
+)
+def test_the_smallest_box_around_places(longitudes, latitudes, box):
+    assert box_around(np.array(longitudes), np.array(latitudes)) == box
 
 
 def test_entries_that_cannot_be(index, tmp_path):

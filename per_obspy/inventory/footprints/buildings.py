@@ -5,6 +5,7 @@ Pairs refer to it by ``building_id_1`` and ``building_id_2``.
 """
 
 import json
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,25 +51,6 @@ class Buildings(NamedTuple):
     table: pd.DataFrame
 
 
-class Projected(NamedTuple):
-    """
-    Outlines in a transverse Mercator projection about the middle of their layer.
-
-    Attributes
-    ----------
-    outlines : Outlines
-        In metres.
-    table : DataFrame
-        The buildings with longitude and latitude of their centroids, degrees, and areas, m2.
-    central_meridian : float
-        Degrees.
-    """
-
-    outlines: Outlines
-    table: pd.DataFrame
-    central_meridian: float
-
-
 def without_repetitions(
     outlines: pa.Array, table: pd.DataFrame, source: str
 ) -> tuple[Buildings, tuple[Rejection, ...]]:
@@ -101,21 +83,17 @@ def without_repetitions(
 
 def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
     """Return where an outline repeats an earlier one, whatever the order of its points."""
-    hashes = [np.empty(0, dtype=np.uint64)]
+    digests = list[bytes]()
     for _, shapes in blocks(outlines):
-        normal = shapely.to_wkb(shapely.normalize(shapes))
-        hashes.append(pd.util.hash_array(normal, categorize=False))
-    # A hash may be shared by chance: the outlines themselves decide
-    shared = np.flatnonzero(pd.Series(np.concatenate(hashes)).duplicated(keep=False))
-    shapes = shapely.to_wkb(shapely.normalize(polygons(outlines.take(pa.array(shared)))))
-    repeated = np.zeros(len(outlines), dtype=bool)
-    repeated[shared] = pd.Series(shapes, dtype=object).duplicated()
-    return repeated
+        # Shorter than the outlines, and never shared by two
+        for wkb in shapely.to_wkb(shapely.normalize(shapes)):
+            digests.append(blake2b(wkb, digest_size=16).digest())
+    return pd.Series(digests, dtype=object).duplicated().to_numpy()
 
 
-def projected(buildings: Buildings, source: str) -> Projected:
+def projected(buildings: Buildings, source: str) -> tuple[Buildings, Outlines]:
     """
-    Return outlines in metres, with their places in degrees and areas.
+    Return buildings with their places, degrees, and areas, m2, and their outlines in metres.
 
     Parameters
     ----------
@@ -135,7 +113,7 @@ def projected(buildings: Buildings, source: str) -> Projected:
     for _, degrees in blocks(outlines):
         place.append(shapely.get_coordinates(shapely.centroid(degrees)))
         boxes.append(shapely.bounds(degrees))
-    transformer, central_meridian = _projection(np.concatenate(boxes), source)
+    transformer, meridian = _projection(np.concatenate(boxes), source)
     # Boxes and areas in metres
     bounds, area = [], []
     for _, degrees in blocks(outlines):
@@ -153,7 +131,7 @@ def projected(buildings: Buildings, source: str) -> Projected:
         latitude=latitude,
         area=np.concatenate(area),
     )
-    return Projected(Outlines(np.concatenate(bounds), in_metres), table, central_meridian)
+    return Buildings(outlines, table), Outlines(np.concatenate(bounds), in_metres, meridian)
 
 
 def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:

@@ -9,6 +9,7 @@ Source: OGC 12-019, City Geography Markup Language 2.0; OGC 08-038r7 on the orde
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def read_citygml(file: Path, source: str) -> RawLayer:
     systems, rows = list[str](), list[dict[str, object]]()
     outlines, faults = list[Any](), dict[int, str]()
     try:
-        for element in _elements(file, source, systems):
+        for element in _buildings(file, source, systems):
             cells, fault = _attributes(element)
             outline, cells["outline"], wrong = _outline(element)
             # A building with a fault loses its outline only
@@ -81,27 +82,19 @@ def read_citygml(file: Path, source: str) -> RawLayer:
     return features(shapes, cell_table(rows), crs, faults)
 
 
-def _elements(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
+def _buildings(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
     """Yield the buildings of a document, and add the names of its reference systems."""
+    # No entity, no address, no unlimited text
+    safe = {"resolve_entities": False, "load_dtd": False, "no_network": True, "huge_tree": False}
+    tags = (*_BUILDINGS, _VERSION_3, "{*}Envelope")
     with file.open("rb") as opened:
-        # No entity, no address, no unlimited text
-        parser = etree.iterparse(
-            opened,
-            events=("start", "end"),
-            tag=(*_BUILDINGS, _VERSION_3, "{*}Envelope"),
-            resolve_entities=False,
-            load_dtd=False,
-            no_network=True,
-            huge_tree=False,
-        )
-        for event, element in parser:
+        for _, element in etree.iterparse(opened, tag=tags, **safe):
             if element.getroottree().docinfo.internalDTD is not None:
                 raise CatalogError(source, "a document type definition is not allowed")
             if element.tag == _VERSION_3:
                 raise CatalogError(source, "CityGML 3.0 is not read, 1.0 and 2.0 are")
-            if event == "start":
-                systems.extend(filter(None, [element.get("srsName")]))
-            elif element.tag in _BUILDINGS:
+            systems.extend(filter(None, [element.get("srsName")]))
+            if element.tag in _BUILDINGS:
                 yield element
                 # Free the memory of the building and of all elements before it
                 element.clear()
@@ -132,40 +125,32 @@ def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
 
 def _attributes(element: Any) -> tuple[dict[str, object], str]:
     """Return the attributes of a building, and the fault of its unit of height if there is one."""
-    height, unit = _text(element, "measuredHeight")
+    children = _children(element)
+    cells: dict[str, Any] = {"id": next(iter(element.xpath("@*[local-name()='id']")), None)}
+    for name, child in children.items():
+        cells[name] = None if child is None else (child.text or "").strip()[:200] or None
     # Units may be names in a dictionary, such as urn:ogc:def:uom:UCUM::m or #m
+    height = children["measuredHeight"]
+    unit = "" if height is None else height.get("uom") or ""
     factor = _UNITS.get(unit.lower().rpartition("#")[2].rpartition(":")[2])
-    cells: dict[str, object] = {
-        "id": next(iter(element.xpath("@*[local-name()='id']")), None),
-        "measuredHeight": _number(height, factor or 1.0),
-        "storeysAboveGround": _number(_text(element, "storeysAboveGround")[0], 1.0),
-        "usage": _text(element, "usage")[0],
-        "structure_type": _short(next(element.iter("{*}buildingStructureType"), None)),
-        "address": _short(next(element.iter("{*}LocalityName"), None)),
-    }
+    for name, scale in (("measuredHeight", factor or 1.0), ("storeysAboveGround", 1.0)):
+        # A text that is no number stays as it is
+        with suppress(ValueError, TypeError):
+            cells[name] = float(cells[name]) * scale
     return cells, "" if factor else f"measuredHeight has the unit {unit!r:.40}, expected m"
 
 
-def _text(element: Any, name: str) -> tuple[str | None, str]:
-    """Return the text of a child, of parts where the building itself has none, and its unit."""
-    space = f"{{{etree.QName(element).namespace}}}"
-    child = element.find(f"{space}{name}")
-    if child is None:
-        child = element.find(f"{space}consistsOfBuildingPart//{space}{name}")
-    return _short(child), "" if child is None else child.get("uom") or ""
-
-
-def _short(element: Any) -> str | None:
-    """Return the text of an element, None if it is missing or empty."""
-    return None if element is None else (element.text or "").strip()[:200] or None
-
-
-def _number(text: str | None, factor: float) -> object:
-    """Return a number in m, or the text if it is none."""
-    try:
-        return None if text is None else float(text) * factor
-    except ValueError:
-        return text
+def _children(element: Any) -> dict[str, Any]:
+    """Return the elements of a building's attributes, None where it has none."""
+    space, children = f"{{{etree.QName(element).namespace}}}", dict[str, Any]()
+    # Of the building, or of parts where it has none; then those of any place
+    for name in ("measuredHeight", "storeysAboveGround", "usage"):
+        children[name] = element.find(f"{space}{name}")
+        if children[name] is None:
+            children[name] = element.find(f"{space}consistsOfBuildingPart//{space}{name}")
+    for name, tag in (("structure_type", "buildingStructureType"), ("address", "LocalityName")):
+        children[name] = next(element.iter(f"{{*}}{tag}"), None)
+    return children
 
 
 def _outline(element: Any) -> tuple[Any, str | None, str]:

@@ -5,7 +5,7 @@ Outlines are a column of polygons as WKT or GeoJSON in degrees, or rectangles fr
 latitude of their centres, width, length, and the azimuth of the length.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, shortened
 from per_obspy.inventory.cells import is_unknown, read_numbers
 from per_obspy.inventory.files.formats import PLAIN, PairFile
+from per_obspy.inventory.files.raw_rows import Contents, RawRows, together
 from per_obspy.inventory.files.text_lines import open_text
 from per_obspy.inventory.footprints.json_buildings import geojson_text
 from per_obspy.inventory.footprints.raw_layer import Geometries, RawLayer, as_wkb
@@ -37,22 +38,21 @@ NAMES = {
     "area": ("area", "planarea", "plan_area", "footprint_area", "area_in_meters"),
     "building_id": ("building_id", "id"),
 }
-RECTANGLE = ("longitude", "latitude", "width", "length", "azimuth")
-
-#: Beginning of WKT that is read: nested collections could exhaust the reader.
-_POLYGON = r"(?i)^\s*(?:MULTI)?POLYGON\b"
-
-#: Longest text of an outline, characters.
-LONGEST_OUTLINE = 1 << 20
 
 #: Least and largest value of each number of a rectangle: degrees, degrees, m, m, degrees.
-_RANGES = {
+RECTANGLE = {
     "longitude": (-180.0, 180.0),
     "latitude": (-90.0, 90.0),
     "width": (0.1, 1e3),
     "length": (0.1, 1e3),
     "azimuth": (-360.0, 360.0),
 }
+
+#: Beginning of WKT that is read: nested collections could exhaust the reader.
+_POLYGON = r"(?i)^\s*(?:MULTI)?POLYGON\b"
+
+#: Longest text of an outline, characters.
+LONGEST_OUTLINE = 1 << 20
 
 
 def read_csv_buildings(file: Path, source: str) -> RawLayer:
@@ -73,7 +73,7 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer:
         message names those.
     """
     try:
-        table = PairFile(open_text(file, PLAIN))
+        table = _in_memory(open_text(file, PLAIN))
         # Headings as they are: their translations are those of pairs
         names = table.own_names
         columns = _columns(source, names)
@@ -82,27 +82,39 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer:
         raise CatalogError(source, error.problem) from error
     if not blocks:
         raise CatalogError(source, "the table has no rows")
-    broken = [
-        line._replace(kind="building", source=source) for each in blocks for line in each.broken
-    ]
-    rows = pa.concat_tables([block.table for block in blocks]).rename_columns(names)
+    rows = together(blocks)
+    attributes = rows.table.rename_columns(names)
     # Outlines as they are, or as rectangles
-    read = _polygons if "wkt" in columns else _rectangles
-    outlines, faults = read(rows, columns)
-    attributes = rows.drop_columns([columns["wkt"]] if "wkt" in columns else [])
+    if "wkt" in columns:
+        outlines, faults = _polygons(columns["wkt"], attributes[columns["wkt"]])
+        attributes = attributes.drop_columns([columns["wkt"]])
+    else:
+        outlines, faults = _rectangles(attributes, columns)
     # Identifiers under the name of the schema
     if columns.get("building_id", "building_id") != "building_id":
-        attributes = attributes.append_column("building_id", rows[columns["building_id"]])
-    lines = np.concatenate([block.lines for block in blocks])
+        attributes = attributes.append_column("building_id", attributes[columns["building_id"]])
+    broken = tuple(line._replace(kind="building", source=source) for line in rows.broken)
     # Positions of a table are degrees
-    return RawLayer(as_wkb(outlines), attributes, "OGC:CRS84", lines, faults, tuple(broken))
+    return RawLayer(as_wkb(outlines), attributes, "OGC:CRS84", rows.lines, faults, broken)
+
+
+def _in_memory(contents: Contents) -> PairFile:
+    """Return a table whose cells are read from the file once: all outlines are needed anyway."""
+    named = [place for place, name in enumerate(contents.names) if name]
+    stored = list(contents.blocks(named))
+
+    def blocks(places: Sequence[int]) -> Iterator[RawRows]:
+        for rows in stored:
+            yield rows._replace(table=rows.table.select([str(place) for place in places]))
+
+    return PairFile(contents._replace(blocks=blocks))
 
 
 def _columns(source: str, names: Sequence[str]) -> dict[str, str]:
     """Return the columns of the file that make outlines, by their names here."""
-    repeated = sorted({name for name in names if list(names).count(name) > 1})
-    if repeated:
-        raise CatalogError(source, f"column {repeated[0]} occurs more than once")
+    for name in sorted(names):
+        if names.count(name) > 1:
+            raise CatalogError(source, f"column {name} occurs more than once")
     # The first name of each that the file has, whatever the case of its letters
     by_lower = {name.lower(): name for name in reversed(names)}
     columns = {}
@@ -129,10 +141,9 @@ def _missing(names: Sequence[str], columns: Mapping[str, str]) -> str:
     return f"points have no walls, and a gap is a distance between walls{area}: {wanted} ({units})"
 
 
-def _polygons(rows: pa.Table, columns: Mapping[str, str]) -> tuple[Geometries, dict[int, str]]:
+def _polygons(name: str, column: pa.ChunkedArray) -> tuple[Geometries, dict[int, str]]:
     """Return polygons from WKT or GeoJSON, None where a cell has none, with the reasons."""
-    name = columns["wkt"]
-    texts = rows[name].to_pandas().fillna("").astype(str)
+    texts = column.to_pandas().fillna("").astype(str)
     cells = texts.where(texts.str.len() <= LONGEST_OUTLINE, "").to_numpy(dtype=object)
     is_wkt = texts.str.contains(_POLYGON, regex=True).to_numpy(dtype=bool)
     outlines = np.full(len(cells), None, dtype=object)
@@ -167,32 +178,27 @@ def _rectangles(rows: pa.Table, columns: Mapping[str, str]) -> tuple[Geometries,
     good = ~np.isnan(sides).any(axis=0)
     outlines = np.full(good.size, None, dtype=object)
     if good.any():
-        outlines[good] = shapely.polygons(_corners(*(side[good] for side in sides)))
+        outlines[good] = shapely.polygons(_corners(np.stack(sides)[:, good]))
     return outlines, faults
 
 
 def _side(name: str, cells: pd.Series) -> tuple[FloatArray, dict[int, str]]:
     """Return a number of rectangles, NaN where it cannot be used, with the reasons."""
-    read, (low, high) = read_numbers(name, cells), _RANGES[name]
+    read, (low, high) = read_numbers(name, cells), RECTANGLE[name]
     good, problems = (read.values >= low) & (read.values <= high), dict[int, str]()
     # Empty cells by name, others as they are
+    is_empty = np.isnan(read.values)
+    is_empty[[*read.notes, *read.placeholders]] = False
     for i in np.flatnonzero(~good).tolist():
-        is_empty = np.isnan(read.values[i]) and i not in read.notes | read.placeholders
         quoted = f"= {shortened(str(cells.iloc[i]), 40)!r} is no usable {name}"
-        problems[i] = "is empty" if is_empty else quoted
+        problems[i] = "is empty" if is_empty[i] else quoted
     return np.where(good, read.values, np.nan), problems
 
 
-def _corners(
-    longitude: FloatArray,
-    latitude: FloatArray,
-    width: FloatArray,
-    length: FloatArray,
-    azimuth: FloatArray,
-) -> FloatArray:
-    """Return the corners of rectangles in degrees, (n, 4, 2), on the ellipsoid."""
-    geod = pyproj.Geod(ellps="WGS84")
-    reach = np.hypot(width, length) / 2.0
+def _corners(sides: FloatArray) -> FloatArray:
+    """Return corners in degrees, (n, 4, 2), on the ellipsoid from the numbers of rectangles."""
+    longitude, latitude, width, length, azimuth = sides
+    geod, reach = pyproj.Geod(ellps="WGS84"), np.hypot(width, length) / 2.0
     turn = np.degrees(np.arctan2(width, length))
     # From the centre to each corner in turn
     corners = []

@@ -4,7 +4,7 @@ Pairs of neighbouring buildings from footprints, as a checked pair table.
 Rows of the table are made and checked block by block, to bound memory.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,14 +18,9 @@ from per_obspy.inventory.cells import NOTES
 from per_obspy.inventory.checking import Rejections, checked_pairs
 from per_obspy.inventory.contact_height import floor_offset
 from per_obspy.inventory.footprints.building_columns import building_columns
-from per_obspy.inventory.footprints.buildings import (
-    Buildings,
-    Projected,
-    projected,
-    without_repetitions,
-)
+from per_obspy.inventory.footprints.buildings import Buildings, projected, without_repetitions
 from per_obspy.inventory.footprints.layers import read_layer
-from per_obspy.inventory.footprints.neighbours import Neighbours, neighbours
+from per_obspy.inventory.footprints.neighbours import neighbours
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
 
@@ -40,8 +35,7 @@ OVERLAP = 0.02
 #: Pairs per block, to bound memory.
 CHUNK = 50_000
 
-#: Columns of a pair as they are measured, and those that help to make its row.
-_MEASURED = ("first", "second", "overlap", "gap", "facing_length", "inside_1", "inside_2")
+#: Columns that help to make the row of a pair.
 _HELPERS = ["first", "second", "overlap", "inside_1", "inside_2", "repeated"]
 
 #: Columns that every building has besides those of its layer.
@@ -135,26 +129,31 @@ def find_footprint_pairs(
     # Footprints, without those that repeat another
     source = str(path)
     buildings, rejected = _usable_buildings(path, layer, columns or {})
-    shapes = projected(buildings, source)
-    near = neighbours(shapes.outlines, largest)
-    if near.first.size == 0:
+    buildings, outlines = projected(buildings, source)
+    pairs = neighbours(outlines, largest)
+    if pairs.empty:
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
+    pairs = _with_names(pairs, buildings.table, outlines.meridian)
     # Pairs, checked as if they came from a file
     drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
-    found = _pairs_of(near, shapes)
-    pairs, unusable = _checked_table(found, shapes.table, drawn, source)
-    pairs.attrs["rejected"] = Rejections((*rejected, *unusable))
-    left_out = _middle(found, shapes.table, unusable)
-    return FootprintPairs(pairs, Buildings(buildings.outlines, shapes.table), left_out)
+    table, unusable = _checked_table(pairs, buildings.table, drawn, source)
+    table.attrs["rejected"] = Rejections((*rejected, *unusable))
+    return FootprintPairs(table, buildings, _middle(pairs, buildings.table, unusable))
 
 
-def _middle(
-    found: pd.DataFrame, buildings: pd.DataFrame, rejected: Sequence[Rejection]
-) -> FloatArray:
-    """Return longitude and latitude amid both buildings of rejected pairs, degrees."""
-    lost = found[found["pair_id"].isin({rejection.name for rejection in rejected})]
+def _middle(pairs: pd.DataFrame, buildings: pd.DataFrame, rejected: list[Rejection]) -> FloatArray:
+    """Return longitude and latitude amid both buildings of rejected pairs, degrees, (n, 2)."""
+    lost = pairs[pairs["pair_id"].isin({rejection.name for rejection in rejected})]
     places = buildings[["longitude", "latitude"]].to_numpy()
     return np.asarray(0.5 * (places[lost["first"]] + places[lost["second"]]))
+
+
+def _require_within(name: str, length: float, column: str) -> None:
+    """Raise ValueError if a length, m, is above the range of a column."""
+    limit = COLUMNS[column].high
+    if length > limit:
+        problem = f"must not be above the largest {column}, {limit:g} m, got {length:g}"
+        raise ValueError(f"{name} {problem}")
 
 
 def _usable_buildings(
@@ -175,31 +174,33 @@ def _usable_buildings(
     return buildings, rejected
 
 
-def _require_within(name: str, length: float, column: str) -> None:
-    """Raise ValueError if a length, m, is above the range of a column."""
-    limit = COLUMNS[column].high
-    if length > limit:
-        problem = f"must not be above the largest {column}, {limit:g} m, got {length:g}"
-        raise ValueError(f"{name} {problem}")
-
-
-def _pairs_of(near: Neighbours, shapes: Projected) -> pd.DataFrame:
-    """Return one row per pair: positions of its buildings, and what does not depend on a column."""
-    buildings = shapes.table["building_id"].to_numpy(dtype=object)
-    longitude, latitude = (shapes.table[name].to_numpy() for name in ("longitude", "latitude"))
+def _with_names(pairs: pd.DataFrame, buildings: pd.DataFrame, meridian: float) -> pd.DataFrame:
+    """Return neighbours with the names of the pairs and azimuths from true north."""
+    identifiers = buildings["building_id"].to_numpy(dtype=object)
+    names = pd.Series(identifiers[pairs["first"]] + "/" + identifiers[pairs["second"]])
     # A projection's north turns with the longitude
-    east = longitude[near.first] - shapes.central_meridian
+    longitude, latitude = (buildings[name].to_numpy() for name in ("longitude", "latitude"))
+    east = longitude[pairs["first"]] - meridian
     east -= 360.0 * np.round(east / 360.0)
-    convergence = east * np.sin(np.deg2rad(latitude[near.first]))
-    names = pd.Series(buildings[near.first] + "/" + buildings[near.second])
-    columns = {
-        **{name: getattr(near, name) for name in _MEASURED},
-        "azimuth": (near.azimuth + convergence) % 360.0,
-        "pair_id": names,
-        "repeated": names.duplicated(),
-    }
-    # No copy: neighbours are many
-    return pd.DataFrame(columns, copy=False)
+    convergence = east * np.sin(np.deg2rad(latitude[pairs["first"]]))
+    azimuth = (pairs["azimuth"] + convergence) % 360.0
+    return pairs.assign(azimuth=azimuth, pair_id=names, repeated=names.duplicated())
+
+
+def _checked_table(
+    pairs: pd.DataFrame, buildings: pd.DataFrame, drawn: Mapping[str, Any], source: str
+) -> tuple[pd.DataFrame, list[Rejection]]:
+    """Return the pair table, and a rejection for each pair that cannot be used."""
+    columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
+    for start in range(0, len(pairs), CHUNK):
+        part = _with_positions(pairs.iloc[start : start + CHUNK])
+        part = _with_buildings(part, buildings)
+        checked = _checked_block(part.assign(**drawn), source, rejected)
+        for name, column in checked.items():
+            columns.setdefault(str(name), []).append(column.copy())
+    # Joined column by column, so that no second copy of the whole table is in memory
+    joined = {name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}
+    return pd.DataFrame(joined, copy=False), rejected
 
 
 def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
@@ -208,21 +209,6 @@ def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
     inside = {"position": inside_1 & inside_2, "position_1": inside_1, "position_2": inside_2}
     words = dict(zip((False, True), POSITIONS, strict=True))
     return pairs.assign(**{name: each.map(words) for name, each in inside.items()})
-
-
-def _checked_table(
-    found: pd.DataFrame, buildings: pd.DataFrame, drawn: Mapping[str, Any], source: str
-) -> tuple[pd.DataFrame, list[Rejection]]:
-    """Return the pair table, and a rejection for each pair that cannot be used."""
-    columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
-    for start in range(0, len(found), CHUNK):
-        part = _with_buildings(found.iloc[start : start + CHUNK], buildings)
-        checked = _checked_block(part.assign(**drawn), source, rejected)
-        for name, column in checked.items():
-            columns.setdefault(str(name), []).append(column.copy())
-    # Joined column by column, so that no second copy of the whole table is in memory
-    joined = {name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}
-    return pd.DataFrame(joined, copy=False), rejected
 
 
 def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -> pd.DataFrame:
@@ -246,7 +232,7 @@ def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -
 def _with_buildings(pairs: pd.DataFrame, buildings: pd.DataFrame) -> pd.DataFrame:
     """Return some pairs with the columns of both buildings, before any check."""
     names = [*_PLACE, *buildings.columns.drop(_PLACE)]
-    sides = [_with_positions(pairs.reset_index(drop=True))]
+    sides = [pairs.reset_index(drop=True)]
     for i, side in ((1, "first"), (2, "second")):
         chosen = _with_height(buildings.iloc[pairs[side]][names].reset_index(drop=True))
         # Columns of a pair, in notes too, have the number of the building

@@ -7,6 +7,7 @@ Microsoft publishes lines. Assets are a collection of features with a unit, a li
 
 import json
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,13 +15,13 @@ import numpy as np
 import shapely
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints.raw_layer import Geometries, RawLayer, cell_table, features
+from per_obspy.inventory.footprints.raw_layer import RawLayer, cell_table, features
 
 #: Longest line, bytes: a footprint of ten thousand corners. Most lines that are read.
 LONGEST_LINE, MOST_LINES = 1 << 20, 5_000_000
 
-#: Largest file of assets, which is read as a whole, bytes, and the beginning that shows its kind.
-LARGEST_ASSETS, _HEAD = 512 << 20, 1 << 16
+#: Largest file of assets, which is read as a whole, bytes.
+LARGEST_ASSETS = 512 << 20
 
 #: Geometries that are parsed together.
 _BLOCK = 20_000
@@ -65,33 +66,24 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
 
 def _layer(found: Iterator[_Feature]) -> RawLayer:
     """Return features as a layer; their geometries are parsed block by block."""
-    texts, shapes, faults = list[str | None](), [np.empty(0, dtype=object)], dict[int, str]()
+    shapes, faults = [np.empty(0, dtype=object)], dict[int, str]()
 
     # Cells go into columns while geometries are set aside
     def cells() -> Iterator[dict[str, object]]:
-        for row, feature in enumerate(found):
-            texts.append(feature.geometry)
-            if feature.fault:
-                faults[row] = feature.fault
-            if len(texts) == _BLOCK:
-                shapes.append(_parse(texts, row + 1 - _BLOCK, faults))
-                texts.clear()
-            yield feature.cells
+        first = 0
+        while block := list(islice(found, _BLOCK)):
+            texts = np.array([feature.geometry for feature in block], dtype=object)
+            # A number beyond all numbers becomes infinite, which no place on the Earth is
+            with np.errstate(all="ignore"):
+                shapes.append(shapely.from_geojson(texts, on_invalid="ignore"))
+            for row, (text, plain, fault) in enumerate(block):
+                if fault or (text is not None and shapes[-1][row] is None):
+                    faults[first + row] = fault or "not a geometry of GeoJSON"
+                yield plain
+            first += len(block)
 
     table = cell_table(cells())
-    shapes.append(_parse(texts, sum(map(len, shapes)), faults))
     return features(np.concatenate(shapes), table, "OGC:CRS84", faults)
-
-
-def _parse(texts: list[str | None], first: int, faults: dict[int, str]) -> Geometries:
-    """Return geometries, and note the faults of texts that are none."""
-    # A number beyond all numbers becomes infinite, which no place on the Earth is
-    with np.errstate(all="ignore"):
-        shapes = shapely.from_geojson(np.array(texts, dtype=object), on_invalid="ignore")
-    for row in np.flatnonzero(shapely.is_missing(shapes)).tolist():
-        if texts[row] is not None:
-            faults[first + row] = "not a geometry of GeoJSON"
-    return np.asarray(shapes, dtype=object)
 
 
 def _features_of_lines(file: Path, source: str) -> Iterator[_Feature]:
@@ -100,22 +92,25 @@ def _features_of_lines(file: Path, source: str) -> Iterator[_Feature]:
         if row >= MOST_LINES:
             raise CatalogError(source, f"it has more than {MOST_LINES} features: split the file")
         # The fault of a line is that of its building
-        if len(line) > LONGEST_LINE:
-            yield _Feature(None, {}, f"the line is longer than {LONGEST_LINE} bytes")
-            continue
+        geometry, fault, cells = None, "", {}
         try:
-            feature = json.loads(line)
+            feature = {} if len(line) > LONGEST_LINE else json.loads(line)
         except (ValueError, RecursionError) as error:
-            yield _Feature(None, {}, f"not JSON: {str(error)[:80]}")
-            continue
-        # One feature, not a collection of them
-        if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            yield _Feature(None, {}, "not a GeoJSON feature")
-            continue
-        geometry, properties = feature.get("geometry"), feature.get("properties")
-        cells = properties if isinstance(properties, dict) else {}
-        plain = {name: plain_cell(value) for name, value in cells.items()}
-        yield _Feature(None if geometry is None else json.dumps(geometry), plain)
+            fault = f"not JSON: {str(error)[:80]}"
+        else:
+            if len(line) > LONGEST_LINE:
+                fault = f"the line is longer than {LONGEST_LINE} bytes"
+            # One feature, not a collection of them
+            elif _member(feature, "type") != "Feature":
+                fault = "not a GeoJSON feature"
+            else:
+                geometry, cells = feature.get("geometry"), _member(feature, "properties")
+        plain = cells if isinstance(cells, dict) else {}
+        yield _Feature(
+            None if geometry is None else json.dumps(geometry),
+            {name: plain_cell(value) for name, value in plain.items()},
+            fault,
+        )
 
 
 def _lines(file: Path) -> Iterator[bytes]:
@@ -145,10 +140,8 @@ def plain_cell(value: object) -> object:
     return json.dumps(value)[:1000]
 
 
-def is_asset_json(file: Path) -> bool:
+def is_asset_json(head: bytes) -> bool:
     """Return whether the beginning of a JSON file has the words of SimCenter's assets."""
-    with file.open("rb") as opened:
-        head = opened.read(_HEAD)
     return b'"GeneralInformation"' in head or (b'"NumberOfStories"' in head and b'"units"' in head)
 
 
@@ -194,11 +187,9 @@ def _asset(asset: dict[str, Any], common_units: object) -> _Feature:
     if isinstance(asset.get("geometry"), dict):
         building.pop("geometry", None)
     cells = {LENGTH_UNIT: _member(building.get("units") or common_units, "length"), **building}
-    plain = {
-        str(name)[:200]: plain_cell(value)
-        for name, value in cells.items()
-        if name not in ("Footprint", "units")
-    }
+    plain = {str(name)[:200]: plain_cell(value) for name, value in cells.items()}
+    for name in ("Footprint", "units"):
+        plain.pop(name, None)
     # Outline, or position, or the reason for the rejection
     try:
         return _Feature(_asset_geometry(asset, building), plain)
@@ -213,14 +204,13 @@ def _asset_geometry(asset: dict[str, Any], building: dict[str, Any]) -> str:
     if building.get("Footprint"):
         return geojson_text(building["Footprint"])
     # A point, which the layer needs to be called one
-    location = building.get("location")
-    place = [
-        building.get(name.capitalize(), _member(location, name))
-        for name in ("longitude", "latitude")
-    ]
-    if all(isinstance(degrees, int | float) for degrees in place):
-        return json.dumps({"type": "Point", "coordinates": place})
-    raise ValueError("neither Footprint nor location")
+    place = []
+    for name in ("longitude", "latitude"):
+        degrees = building.get(name.capitalize(), _member(building.get("location"), name))
+        if not isinstance(degrees, int | float):
+            raise ValueError("neither Footprint nor location")
+        place.append(degrees)
+    return json.dumps({"type": "Point", "coordinates": place})
 
 
 def geojson_text(cell: object) -> str:

@@ -13,7 +13,9 @@ import sqlite3
 import warnings
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,8 @@ _OSM_COLUMNS = ["osm_id", "osm_way_id", "name", "building", "other_tags"]
 #: Beginning of GDAL's message for a file whose nodes are not in the order of their numbers.
 _UNSORTED = "Non increasing node id"
 
+_OSM = "OpenStreetMap file"
+
 #: How SQLite keeps a table that holds its rows, and the index of places of one.
 _TABLE = re.compile(r"\s*CREATE\s+TABLE\b", re.IGNORECASE)
 _PLACES = re.compile(
@@ -91,39 +95,37 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     CatalogError
         If the file is missing, or cannot be read as its suffix indicates.
     """
-    if not file.exists():
-        raise CatalogError(str(file), "no such file")
-    _require_known(file)
-    if file.suffix.lower() in GDAL_KINDS:
-        _require_beginning(file)
+    if problem := _wrong_file(file):
+        raise CatalogError(str(file), problem)
     # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
     # of .osm.pbf (reasoned)
     size = file.stat().st_size
     limits = Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
     try:
-        found: RawLayer = read_layer_apart(limits, _read, file, layer)
+        raw: RawLayer = read_layer_apart(limits, _read, file, layer)
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
-    return found
+    return raw
 
 
-def _require_known(file: Path) -> None:
-    """Check the suffix of a file: GDAL knows others, but not whether they hold outlines."""
-    suffix, problem = file.suffix.lower(), ""
+def _wrong_file(file: Path) -> str:
+    """Return why a file is not read, by its name and its kind; empty if it is."""
+    suffix = file.suffix.lower()
+    if not file.exists():
+        return "no such file"
+    # GDAL knows other suffixes, but not whether they hold outlines
     if suffix not in SUFFIXES:
-        problem = f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
-    elif not file.is_file():
-        problem = "is no regular file"
-    # Tables and lines may be packed
-    elif suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
+        return f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
+    if not file.is_file():
+        return "is no regular file"
+    if suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:
         expected = ", ".join(f"{name}.gz" for name in _PACKED)
-        problem = f"unknown suffix {file.name[-20:]!r}, expected {expected}"
-    if problem:
-        raise CatalogError(str(file), problem)
+        return f"unknown suffix {file.name[-20:]!r}, expected {expected}"
+    return _wrong_beginning(file) if suffix in GDAL_KINDS else ""
 
 
-def _require_beginning(file: Path) -> None:
-    """Check the first bytes of a file for GDAL, and that no part of it is elsewhere."""
+def _wrong_beginning(file: Path) -> str:
+    """Return why GDAL must not see a file, by its first bytes and its parts; empty if it may."""
     suffix = file.suffix.lower()
     kind, beginnings = GDAL_KINDS[suffix]
     with file.open("rb") as opened:
@@ -132,52 +134,46 @@ def _require_beginning(file: Path) -> None:
         head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if not head.startswith(beginnings):
         error = ValueError(f"it begins with {shortened(head[:20].decode('latin-1'))!r}")
-        raise CatalogError(str(file), unreadable_reason(file, kind, error))
+        return unreadable_reason(file, kind, error)
     # Parts of a file that is here are here too; a folder of links to all parts is one place
     if suffix == ".shp" and not file.is_symlink():
         for part in file.parent.iterdir():
             if part.is_symlink() and part.stem == file.stem:
-                problem = f"its part {part.name} is a link that leads elsewhere"
-                raise CatalogError(str(file), problem)
+                return f"its part {part.name} is a link that leads elsewhere"
+    return ""
 
 
 def _read(file: Path, layer: str | None) -> RawLayer:
-    """Read a layer in the process of readers."""
+    """Read a layer in the process of readers; messages name the file that may be packed."""
+    source = str(file)
     try:
-        if file.suffix.lower() == ".gz":
-            with _unpacked(file) as plain:
-                return _read_plain(plain, str(file), layer)
-        return _read_plain(file, str(file), layer)
+        with _unpacked(file) as plain:
+            suffix = plain.suffix.lower()
+            with plain.open("rb") as opened:
+                head = opened.read(1 << 16)
+            # Microsoft names lines of GeoJSON .csv
+            is_json = head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
+            if suffix in LINES or (suffix == ".csv" and is_json):
+                return read_geojson_lines(plain, source)
+            # Its words tell assets from other JSON
+            if suffix in JSON_SUFFIXES and is_asset_json(head):
+                return read_asset_json(plain, source)
+            if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
+                return _read_gdal(plain, layer)
+            readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
+            return readers.get(suffix, _read_geoparquet)(plain, source)
     except TryLater:
         raise
     except OSError as error:
-        raise CatalogError(str(file), f"cannot be read: {error.strerror or error}") from error
-
-
-def _read_plain(file: Path, source: str, layer: str | None) -> RawLayer:
-    """Read an unpacked file; messages name its source."""
-    suffix = file.suffix.lower()
-    # Microsoft names lines of GeoJSON .csv
-    if suffix in LINES or (suffix == ".csv" and _first_character(file) == b"{"):
-        return read_geojson_lines(file, source)
-    if suffix in JSON_SUFFIXES and is_asset_json(file):
-        return read_asset_json(file, source)
-    if suffix in GDAL_KINDS:
-        return _read_gdal(file, layer)
-    readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
-    readers |= {".pbf": _read_osm, ".osm": _read_osm}
-    return readers.get(suffix, _read_geoparquet)(file, source)
-
-
-def _first_character(file: Path) -> bytes:
-    """Return the first character of a file that is no blank."""
-    with file.open("rb") as opened:
-        return opened.read(4096).lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+        raise CatalogError(source, f"cannot be read: {error.strerror or error}") from error
 
 
 @contextmanager
 def _unpacked(file: Path) -> Iterator[Path]:
-    """Yield the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
+    """Yield a file, or the unpacked copy of one of gzip, refused if too large or damaged."""
+    if file.suffix.lower() != ".gz":
+        yield file
+        return
     ratio = max(LARGEST_RATIO * file.stat().st_size, _SMALL)
     with scratch_folder() as folder:
         plain, problem = folder / file.stem, ""
@@ -199,49 +195,13 @@ def _unpacked(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def _read_osm(file: Path, source: str) -> RawLayer:
-    """Read the areas of an extract that are buildings; GDAL keeps many nodes in a file."""
-    import pyogrio  # in the process of readers only
-
-    require_own_drivers(pyogrio.list_drivers())
-
-    def areas(path: Path, **options: str) -> Any:
-        # The stream of Arrow would not report the errors of this driver
-        return pyogrio.raw.read(
-            path,
-            layer="multipolygons",
-            columns=_OSM_COLUMNS,
-            where="building IS NOT NULL",
-            TAGS_FORMAT="JSON",
-            **options,
-        )
-
-    try:
-        with (
-            warnings.catch_warnings(action="ignore", category=RuntimeWarning),
-            literal_path(file) as path,
-        ):
-            try:
-                meta, _, wkb, fields = areas(path)
-            except pyogrio.errors.FeatureError as error:
-                # The slower index takes nodes in any order
-                if not str(error).startswith(_UNSORTED):
-                    raise
-                meta, _, wkb, fields = areas(path, USE_CUSTOM_INDEXING="NO")
-    except (RuntimeError, ValueError, UnicodeDecodeError) as error:
-        problem = unreadable_reason(file, "OpenStreetMap file", error)
-        raise CatalogError(source, problem) from error
-    attributes = pa.table(dict(zip(meta["fields"], map(pa.array, fields), strict=True)))
-    geometry = pa.chunked_array([pa.array(wkb, pa.large_binary())])
-    return _raw_layer(source, geometry, attributes, meta["crs"])
-
-
 def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     """Read a layer with GDAL."""
     import pyogrio  # in the process of readers only
 
     require_own_drivers(pyogrio.list_drivers())
     suffix = file.suffix.lower()
+    kind, _ = GDAL_KINDS.get(suffix, (_OSM, ()))
     try:
         # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
         with (
@@ -249,25 +209,43 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
             _tables_only(file) as (own, views),
             literal_path(own) as path,
         ):
-            name = _layer_name(file, pyogrio.list_layers(path), layer, views)
-            meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False)
-    except TryLater:
+            if kind == _OSM:
+                crs, table = _areas(path)
+            else:
+                name = _layer_name(file, pyogrio.list_layers(path), layer, views)
+                meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False)
+                crs = meta["crs"]
+    except (CatalogError, TryLater):
         raise
-    except (
-        pyogrio.errors.DataSourceError,
-        pyogrio.errors.DataLayerError,
-        pa.ArrowException,
-        sqlite3.Error,
-        OSError,
-        UnicodeDecodeError,
-    ) as error:
-        problem = unreadable_reason(file, GDAL_KINDS[suffix][0], error)
-        raise CatalogError(str(file), problem) from error
+    except (RuntimeError, ValueError, pa.ArrowException, sqlite3.Error, OSError) as error:
+        raise CatalogError(str(file), unreadable_reason(file, kind, error)) from error
     # Messages of GDAL, except for a reference system that it does not know
-    crs = (_declared_system(file) if suffix in JSON_SUFFIXES else None) or meta["crs"]
-    geometry = table.column_names[-1]
-    fields = [str(name) for name in meta["fields"]]
-    return _raw_layer(str(file), table[geometry], table.select(fields), crs)
+    crs = (_declared_system(file) if suffix in JSON_SUFFIXES else None) or crs
+    return _raw_layer(str(file), table, table.num_columns - 1, crs)
+
+
+def _areas(path: Path) -> tuple[str, pa.Table]:
+    """Return system and areas of an extract that are buildings, outlines last."""
+    import pyogrio
+
+    # The stream of Arrow would not report the errors of this driver, which keeps nodes in a file
+    areas = partial(
+        pyogrio.raw.read,
+        path,
+        layer="multipolygons",
+        columns=_OSM_COLUMNS,
+        where="building IS NOT NULL",
+        TAGS_FORMAT="JSON",
+    )
+    try:
+        meta, _, wkb, fields = areas()
+    except pyogrio.errors.FeatureError as error:
+        # The slower index takes nodes in any order
+        if not str(error).startswith(_UNSORTED):
+            raise
+        meta, _, wkb, fields = areas(USE_CUSTOM_INDEXING="NO")
+    columns = dict(zip(meta["fields"], map(pa.array, fields), strict=True))
+    return meta["crs"], pa.table({**columns, "wkb": pa.array(wkb, pa.large_binary())})
 
 
 @contextmanager
@@ -297,17 +275,16 @@ def _tables_only(file: Path) -> Iterator[tuple[Path, set[str]]]:
 
 def _foreign(file: Path, package: sqlite3.Connection) -> set[str]:
     """Return views and virtual tables but for the index of places; refuse computed columns."""
-    search = "SELECT type, name, sql FROM sqlite_master WHERE type IN ('view', 'table')"
-    foreign, tables = set[str](), list[str]()
-    for kind, name, sql in package.execute(search).fetchall():
-        tables += [name] if kind == "table" else []
+    search = "SELECT name, sql FROM sqlite_master WHERE type IN ('view', 'table')"
+    foreign = set[str]()
+    for name, sql in package.execute(search).fetchall():
         if sql and not (_TABLE.match(sql) or _PLACES.match(sql)):
             foreign.add(name)
-    # Functions that compute a column may do anything
-    for table in (name for name in tables if name not in foreign):
+            continue
+        # Functions that compute a column may do anything
         computed = "SELECT name FROM pragma_table_xinfo(?) WHERE hidden IN (2, 3)"
-        for (column,) in package.execute(computed, (table,)):
-            problem = f"column {column} of table {table} is computed, expected a stored one"
+        for (column,) in package.execute(computed, (name,)):
+            problem = f"column {column} of table {name} is computed, expected a stored one"
             raise CatalogError(str(file), problem)
     return foreign
 
@@ -326,34 +303,40 @@ def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
 
 def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
     """Return the requested one of the layers and their geometries, or the only one with them."""
-    kinds = {str(name): kind for name, kind in layers}
+    kinds = dict(layers.tolist())
     names = ", ".join(kinds) or "none"
     # A layer without geometries is a table
-    spatial = [name for name, kind in kinds.items() if kind is not None]
+    spatial = [layer] if layer in kinds else [name for name, kind in kinds.items() if kind]
     # A view may be what the user means
-    if layer in views or (views and layer is None and not any(kinds.values())):
-        shown = layer or ", ".join(sorted(views))
-        problem = f"layer {shown} is a view, which may have no end: save it as a table"
+    if layer in views or (views and layer is None and not spatial):
+        view = layer or ", ".join(sorted(views))
+        problem = f"layer {view} is a view, which may have no end: save it as a table"
     elif layer is not None and layer not in kinds:
         problem = f"no layer {layer!r} (layers found: {names})"
-    elif layer is not None:
-        return layer
     elif not spatial:
         problem = f"no layer has geometries (layers found: {names})"
     elif len(spatial) > 1:
         problem = f"several layers, name one: {', '.join(spatial)}"
     else:
-        return spatial[0]
+        return str(spatial[0])
     raise CatalogError(str(file), problem)
 
 
 def _declared_system(file: Path) -> str | None:
     """Return the coordinate reference system of a GeoJSON file, for which GDAL may take WGS 84."""
-    try:
-        declared = _members(file).get("crs")
-    except (ValueError, RecursionError) as error:
-        raise CatalogError(str(file), f"not a GeoJSON file: {error}") from error
-    if declared is None:
+    members = {}
+    with file.open("rb") as stream:
+        head, features, _ = stream.read(HEAD).partition(b'"features"')
+    # Most writers have the system before the features, whose objects would not fit in memory
+    if features and b'"crs"' in head:
+        with suppress(ValueError, RecursionError):
+            members = json.loads(head.rstrip().removesuffix(b",") + b"}")
+    if "crs" not in members and b'"crs"' in (text := file.read_bytes()):
+        try:
+            members = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise CatalogError(str(file), f"not a GeoJSON file: {error}") from error
+    if (declared := members.get("crs")) is None:
         return None
     # The name of the older standard, or its form with a code
     try:
@@ -363,25 +346,6 @@ def _declared_system(file: Path) -> str | None:
         return json.dumps(declared)
 
 
-def _members(file: Path) -> dict[str, Any]:
-    """Return the members of a GeoJSON file; those before its features if they have the system."""
-    with file.open("rb") as stream:
-        head, features, _ = stream.read(HEAD).partition(b'"features"')
-    # Most writers have the system before the features, whose objects would not fit in memory
-    if features and b'"crs"' in head:
-        try:
-            members = json.loads(head.rstrip().removesuffix(b",") + b"}")
-        except ValueError:
-            members = {}
-        if "crs" in members:
-            return dict(members)
-    text = file.read_bytes()
-    found = json.loads(text) if b'"crs"' in text else {}
-    if not isinstance(found, dict):
-        raise ValueError(f"a {type(found).__name__} instead of an object")
-    return found
-
-
 def _read_geoparquet(file: Path, source: str) -> RawLayer:
     """Read a GeoParquet file."""
     try:
@@ -389,7 +353,7 @@ def _read_geoparquet(file: Path, source: str) -> RawLayer:
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(source, unreadable_reason(file, "Parquet table", error)) from error
     name, crs = _geometry_column(source, table)
-    return _raw_layer(source, table[name], table.drop_columns([name]), crs)
+    return _raw_layer(source, table, table.column_names.index(name), crs)
 
 
 def _geometry_column(source: str, table: pa.Table) -> tuple[str, Any]:
@@ -428,35 +392,39 @@ def _without_nesting(table: pa.Table) -> pa.Table:
         # The geometry gives the box anyway
         if fields >= {"xmin", "ymin", "xmax", "ymax"}:
             table = table.drop_columns([name])
-        elif name == "names" and "primary" in fields:
-            table = _as_texts(table, name, lambda row: row["primary"])
+            continue
+        if name == "names" and "primary" in fields:
+            value: Callable[[Any], object] = itemgetter("primary")
         elif name == "sources" and pa.types.is_list(kind):
-            table = _as_texts(table, name, _first_dataset)
+            value = _first_dataset
         elif pa.types.is_map(kind):
-            table = _as_texts(table, name, lambda tags: json.dumps(dict(tags)))
+            value = _tags
+        else:
+            continue
+        # As text, whatever the fields are
+        values = [None if cell is None else value(cell) for cell in table[name].to_pylist()]
+        texts = pa.array([None if each is None else str(each) for each in values], pa.string())
+        table = table.set_column(table.column_names.index(name), name, texts)
     return table
 
 
 def _first_dataset(rows: list[Any]) -> object:
-    """Return the data set of the first of several sources, None if it has none."""
     return rows[0].get("dataset") if rows and isinstance(rows[0], dict) else None
 
 
-def _as_texts(table: pa.Table, name: str, value: Callable[[Any], object]) -> pa.Table:
-    """Return a table in which a column of nested cells is text."""
-    values = [None if cell is None else value(cell) for cell in table[name].to_pylist()]
-    texts = pa.array([None if each is None else str(each) for each in values], pa.string())
-    return table.set_column(table.column_names.index(name), name, texts)
+def _tags(tags: list[tuple[str, str]]) -> str:
+    return json.dumps(dict(tags))
 
 
-def _raw_layer(source: str, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
-    """Return a layer whose attributes are plain columns with unique names."""
+def _raw_layer(source: str, table: pa.Table, outlines: int, crs: Any) -> RawLayer:
+    """Return a table, one column of which is WKB, as a layer of plain columns with unique names."""
+    attributes = table.remove_column(outlines).replace_schema_metadata(None)
     names = attributes.column_names
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise CatalogError(source, f"column {repeated[0]} occurs more than once")
+    for name in names:
+        if names.count(name) > 1:
+            raise CatalogError(source, f"column {name} occurs more than once")
     # Text that is not UTF-8 is refused
-    plain, faults = plain_columns(attributes.replace_schema_metadata(None))
+    plain, faults = plain_columns(attributes)
     for row, fault in faults.items():
         raise CatalogError(source, f"feature {row + 1}: {fault}")
-    return RawLayer(wkb, plain, crs, np.arange(1, len(wkb) + 1))
+    return RawLayer(table.column(outlines), plain, crs, np.arange(1, len(table) + 1))

@@ -81,10 +81,15 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
         for i, fault in faults.items():
             good[start + i] = False
             rejected.append(_rejection(file, raw, start + i, fault))
-    attributes = _attributes(raw, good)
     # In the order of the file
     rejected.sort(key=lambda row: row.row or 0)
-    return Layer(pa.concat_arrays(outlines), attributes, tuple(rejected))
+    return Layer(pa.concat_arrays(outlines), _attributes(raw, good), tuple(rejected))
+
+
+def _rejection(file: Path, raw: RawLayer, i: int, fault: str) -> Rejection:
+    """Return the rejection of a feature, by the fault that its reader knows, else its geometry."""
+    number, reason = int(raw.numbers[i]), raw.faults.get(i, fault)
+    return Rejection("building", f"feature {number}", str(file), number, (reason,))
 
 
 def _attributes(raw: RawLayer, good: NDArray[np.bool_]) -> pd.DataFrame:
@@ -92,12 +97,6 @@ def _attributes(raw: RawLayer, good: NDArray[np.bool_]) -> pd.DataFrame:
     mask, columns = pa.array(good), raw.attributes
     cells = {name: columns[name].filter(mask).to_pandas().array for name in columns.column_names}
     return pd.DataFrame(cells, index=pd.Index(raw.numbers[good]), copy=False)
-
-
-def _rejection(file: Path, raw: RawLayer, i: int, fault: str) -> Rejection:
-    """Return the rejection of a feature, by the fault that its reader knows, else its geometry."""
-    number, reason = int(raw.numbers[i]), raw.faults.get(i, fault)
-    return Rejection("building", f"feature {number}", str(file), number, (reason,))
 
 
 def polygons(outlines: pa.Array) -> Geometries:

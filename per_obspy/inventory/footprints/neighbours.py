@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import shapely
 from numpy.typing import NDArray
 
@@ -47,40 +48,13 @@ class Outlines(NamedTuple):
         West, south, east, north, m.
     polygons : callable
         Polygons or multipolygons of an array of positions.
+    meridian : float
+        Longitude along which the north of the projection is true, degrees.
     """
 
     bounds: FloatArray
     polygons: Callable[[IntArray], Geometries]
-
-
-class Neighbours(NamedTuple):
-    """
-    Pairs of footprints, ``first < second``, one element per pair.
-
-    Attributes
-    ----------
-    first, second : (n_pairs,) ndarray of int
-        Positions of the two footprints.
-    gap : (n_pairs,) ndarray
-        Shortest distance, m; 0 if they touch.
-    overlap : (n_pairs,) ndarray
-        Area covered by both, m2.
-    facing_length : (n_pairs,) ndarray
-        Length over which walls face each other, m.
-    azimuth : (n_pairs,) ndarray
-        From first to second, degrees clockwise from the projection's north.
-    inside_1, inside_2 : (n_pairs,) ndarray of bool
-        Whether the first and the second have a further neighbour on the other side.
-    """
-
-    first: IntArray
-    second: IntArray
-    gap: FloatArray
-    overlap: FloatArray
-    facing_length: FloatArray
-    azimuth: FloatArray
-    inside_1: NDArray[np.bool_]
-    inside_2: NDArray[np.bool_]
+    meridian: float = 0.0
 
 
 class _Walls(NamedTuple):
@@ -95,7 +69,7 @@ class _Walls(NamedTuple):
     end: FloatArray
 
 
-def neighbours(outlines: Outlines, distance: float) -> Neighbours:
+def neighbours(outlines: Outlines, distance: float) -> pd.DataFrame:
     """
     Find the pairs of footprints within a distance, block by block.
 
@@ -105,17 +79,28 @@ def neighbours(outlines: Outlines, distance: float) -> Neighbours:
         Footprints in metres, valid.
     distance : float
         Largest gap, m.
+
+    Returns
+    -------
+    pairs : DataFrame
+        ``first`` below ``second``, positions of the footprints; ``gap`` (m; 0 if they touch),
+        ``overlap`` (covered by both, m2), ``facing_length`` (of walls that face each other, m),
+        ``azimuth`` (from first to second, degrees clockwise from the projection's north),
+        ``inside_1``, ``inside_2`` (whether each has a further neighbour on its other side).
     """
     positions, columns = list[IntArray](), list[FloatArray]()
     for first, second in _near_boxes(outlines, distance):
-        found, measured = _measured(outlines, first, second, distance)
-        positions.append(found)
-        columns.append(measured)
+        near, measures = _measure(outlines, first, second, distance)
+        positions.append(np.stack([first[near], second[near]]))
+        columns.append(measures)
     # All pairs, which show where rows go on
     first, second = np.concatenate(positions, axis=1)
-    gap, overlap, facing, azimuth = np.concatenate(columns, axis=1)
-    inside_1, inside_2 = _inside_row(first, second, azimuth)
-    return Neighbours(first, second, gap, overlap, facing, azimuth, inside_1, inside_2)
+    names = ("gap", "overlap", "facing_length", "azimuth")
+    measured = dict(zip(names, np.concatenate(columns, axis=1), strict=True))
+    inside = _inside_row(first, second, measured["azimuth"])
+    # No copy: neighbours are many
+    pairs = {"first": first, "second": second, **measured}
+    return pd.DataFrame(pairs | {"inside_1": inside[0], "inside_2": inside[1]}, copy=False)
 
 
 def _near_boxes(outlines: Outlines, distance: float) -> Iterator[tuple[IntArray, IntArray]]:
@@ -137,14 +122,10 @@ def _near_boxes(outlines: Outlines, distance: float) -> Iterator[tuple[IntArray,
             yield first[chosen], second[chosen]
 
 
-def _measured(
+def _measure(
     outlines: Outlines, first: IntArray, second: IntArray, distance: float
-) -> tuple[IntArray, FloatArray]:
-    """
-    Return the pairs within a distance.
-
-    Their positions, (2, n_pairs), and gap, overlap, facing length and azimuth, (4, n_pairs).
-    """
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which pairs are near, and their gap, overlap, facing length and azimuth, (4, n)."""
     # Polygons of the block, each once
     numbers, place = np.unique(np.concatenate([first, second]), return_inverse=True)
     polygons = outlines.polygons(numbers)
@@ -157,27 +138,21 @@ def _measured(
     overlap, touch = np.zeros(gap.size), gap == 0.0
     shared = shapely.intersection(polygons[one[touch]], polygons[other[touch]])
     overlap[touch] = shapely.area(shared)
-    return np.stack([first[near], second[near]]), np.stack([gap, overlap, facing, azimuth])
+    return near, np.stack([gap, overlap, facing, azimuth])
 
 
 def _axis(
     polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length of facing walls of each pair, m, and its azimuth, degrees."""
-    # By facing walls where there are any, else by the shortest connection
     facing, normals = _facing(polygons, first, second, gap)
-    connection = _connection(polygons[first], polygons[second], gap)
-    axis = np.where(facing[:, None] > 0.0, normals, connection)
-    return facing, np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
-
-
-def _connection(first: Geometries, second: Geometries, gap: FloatArray) -> FloatArray:
-    """Return the shortest connection of each pair; if they touch, the line between the centres."""
-    line = shapely.get_coordinates(shapely.shortest_line(first, second)).reshape(-1, 2, 2)
-    # A shortest line of length 0 has no direction
-    centre_1 = shapely.get_coordinates(shapely.centroid(first))
-    centre_2 = shapely.get_coordinates(shapely.centroid(second))
-    return np.asarray(np.where(gap[:, None] > 0.0, line[:, 1] - line[:, 0], centre_2 - centre_1))
+    one, other = polygons[first], polygons[second]
+    line = shapely.get_coordinates(shapely.shortest_line(one, other)).reshape(-1, 2, 2)
+    # A shortest line of length 0 has no direction: that between the centres of touching ones
+    centre_1, centre_2 = (shapely.get_coordinates(shapely.centroid(each)) for each in (one, other))
+    shortest = np.where(gap > 0.0, (line[:, 1] - line[:, 0]).T, (centre_2 - centre_1).T)
+    axis = np.where(facing > 0.0, normals, shortest)
+    return facing, np.rad2deg(np.arctan2(*axis)) % 360.0
 
 
 def _walls(polygons: Geometries) -> _Walls:
@@ -197,7 +172,7 @@ def _walls(polygons: Geometries) -> _Walls:
 def _facing(
     polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the length of facing walls of each pair, m, and the sum of normal times length."""
+    """Return the length of facing walls of each pair, m, and sums of normal by length, (2, n)."""
     walls, bounds = _walls(polygons), shapely.bounds(polygons)
     # Combinations of walls that come near the other building
     reach = gap + FACING_DEPTH
@@ -209,9 +184,9 @@ def _facing(
     pair, wall_1, wall_2 = pair_1[row_1], near_1[row_1], near_2[row_2]
     # Sums over the combinations of each pair
     shared, normal = _facing_walls(walls, wall_1, wall_2, reach[pair])
-    east, north = (np.bincount(pair, shared * each, minlength=reach.size) for each in normal.T)
+    sums = [np.bincount(pair, shared * each, minlength=reach.size) for each in normal.T]
     length = np.bincount(pair, shared, minlength=reach.size)
-    return np.asarray(length, dtype=np.float64), np.column_stack([east, north])
+    return np.asarray(length, dtype=np.float64), np.stack(sums)
 
 
 def _expanded(starts: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:

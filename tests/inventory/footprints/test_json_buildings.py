@@ -130,7 +130,7 @@ def test_a_single_asset_and_one_without_outline(tmp_path):
     assets = json.loads(r2d_assets(tmp_path, small_town()).read_text())
     path = tmp_path / "one.json"
     path.write_text(json.dumps(assets[0]))
-    assert is_asset_json(path)
+    assert is_asset_json(path.read_bytes())
     assert geometries(read_asset_json(path, "one"))[0].geom_type == "Polygon"
     del assets[0]["GeneralInformation"]["Footprint"]
     path.write_text(json.dumps(assets[0]))

@@ -25,9 +25,9 @@ HOUSE = shapely.box(0, 0, 10, 12)
 def test_two_houses_side_by_side(gap):
     near = _found(HOUSE, shapely.box(10 + gap, 0, 20 + gap, 12))
     assert_allclose(
-        [near.gap[0], near.azimuth[0], near.facing_length[0]], [gap, 90.0, 12.0], atol=1e-12
+        [near["gap"][0], near["azimuth"][0], near["facing_length"][0]], [gap, 90.0, 12.0], atol=1e-12
     )
-    assert near.overlap[0] == 0.0
+    assert near["overlap"][0] == 0.0
 
 
 @pytest.mark.parametrize("angle", [17.0, 90.0, 205.0])
@@ -48,26 +48,26 @@ def test_turning_the_town_turns_the_axis_only(angle):
 
 def test_facing_length_is_what_both_walls_share():
     near = _found(HOUSE, shapely.box(10.2, 7, 20, 30))
-    assert_allclose(near.facing_length, 5.0, rtol=1e-12)
+    assert_allclose(near["facing_length"], 5.0, rtol=1e-12)
 
 
 def test_a_wall_that_stands_back_does_not_face():
     # an L: 4 m of its wall at 0.1 m, the other 8 m set back by 3 m
     corner = shapely.Polygon([(10.1, 0), (20, 0), (20, 12), (13.1, 12), (13.1, 4), (10.1, 4)])
     near = _found(HOUSE, corner)
-    assert_allclose(near.facing_length, 4.0, rtol=1e-12)
-    assert_allclose(near.azimuth, 90.0, atol=1e-9)
+    assert_allclose(near["facing_length"], 4.0, rtol=1e-12)
+    assert_allclose(near["azimuth"], 90.0, atol=1e-9)
 
 
 def test_the_far_side_and_the_inside_of_walls_do_not_face():
     # would catch a missing test of direction: a thin house has two walls within reach
     near = _found(HOUSE, shapely.box(10.05, 0, 10.15, 12))
-    assert_allclose(near.facing_length, 12.0, rtol=1e-12)
+    assert_allclose(near["facing_length"], 12.0, rtol=1e-12)
 
 
 def test_corners_that_meet_have_no_facing_wall_but_an_axis():
     near = _found(HOUSE, shapely.box(11, 13, 20, 20))
-    measured = [near.gap[0], near.facing_length[0], near.azimuth[0]]
+    measured = [near["gap"][0], near["facing_length"][0], near["azimuth"][0]]
     assert_allclose(measured, [np.sqrt(2), 0.0, 45.0], atol=1e-12)
     # corners that touch: the axis joins the centres
     touching = _found(shapely.box(0, 0, 10, 10), shapely.box(10, 10, 20, 20))
@@ -78,12 +78,12 @@ def test_a_house_in_a_corner_lies_along_the_mean_normal():
     # walls of 4 m to the east and 4 m to the north: the resultant points north-east
     around = shapely.Polygon([(0, 6), (10, 6), (10, 0), (16, 0), (16, 12), (0, 12)])
     near = _found(shapely.box(6, 2, 10, 6), around)
-    assert_allclose([near.azimuth[0], near.facing_length[0]], [45.0, 8.0], atol=1e-9)
+    assert_allclose([near["azimuth"][0], near["facing_length"][0]], [45.0, 8.0], atol=1e-9)
 
 
 def test_crossing_party_walls_overlap():
     near = _found(HOUSE, shapely.box(9.9, 0, 20, 12))
-    assert_allclose([near.gap[0], near.overlap[0], near.azimuth[0]], [0.0, 1.2, 90.0], atol=1e-9)
+    assert_allclose([near["gap"][0], near["overlap"][0], near["azimuth"][0]], [0.0, 1.2, 90.0], atol=1e-9)
 
 
 def test_round_off_is_no_gap():
@@ -97,7 +97,7 @@ def test_a_building_of_two_parts_and_a_courtyard():
     # a house inside a courtyard faces four walls of 9 m
     yard = shapely.box(0, 0, 30, 30).difference(shapely.box(10, 10, 20, 20))
     near = _found(yard, shapely.box(10.5, 10.5, 19.5, 19.5))
-    assert_allclose([near.gap[0], near.facing_length[0]], [0.5, 36.0], rtol=1e-12)
+    assert_allclose([near["gap"][0], near["facing_length"][0]], [0.5, 36.0], rtol=1e-12)
 
 
 def test_the_order_of_points_does_not_matter():
@@ -109,9 +109,9 @@ def test_ends_and_insides_of_a_row():
     # would catch neighbours on the same side taken for a continued row
     row = [shapely.box(10 * i, 0, 10 * i + 9.8, 12) for i in range(4)]
     near = _found(*row)
-    assert near.first.tolist() == [0, 1, 2]
-    assert near.inside_1.tolist() == [False, True, True]
-    assert near.inside_2.tolist() == [True, True, False]
+    assert near["first"].tolist() == [0, 1, 2]
+    assert near["inside_1"].tolist() == [False, True, True]
+    assert near["inside_2"].tolist() == [True, True, False]
     # a neighbour behind does not continue the row
     behind = _found(row[0], row[1], shapely.box(0, 12, 9.8, 24), shapely.box(10, 12, 19.8, 24))
     assert not behind.inside_1.any()
@@ -128,9 +128,9 @@ def test_all_pairs_of_a_random_town_by_brute_force():
     near = _neighbours(town, 2.0)
     brute = shapely.distance(town[:, None], town[None, :])
     first, second = np.nonzero(np.triu(brute <= 2.0, k=1))
-    assert_array_equal(near.first, first)
-    assert_array_equal(near.second, second)
-    assert_allclose(near.gap, brute[first, second], atol=module.TOUCHING)
+    assert_array_equal(near["first"], first)
+    assert_array_equal(near["second"], second)
+    assert_allclose(near["gap"], brute[first, second], atol=module.TOUCHING)
 
 
 def test_a_wide_building_among_many_small_ones(monkeypatch):
@@ -138,10 +138,10 @@ def test_a_wide_building_among_many_small_ones(monkeypatch):
     monkeypatch.setattr(module, "CHUNK", 7)
     houses = [shapely.box(10.0 * i, 0, 10.0 * i + 9.5, 12) for i in range(30)]
     near = _found(shapely.box(0, 12.5, 300, 20), *houses, distance=1.0)
-    assert near.first[:30].tolist() == [0] * 30
-    assert near.second[:30].tolist() == list(range(1, 31))
-    assert_allclose(near.gap, 0.5, atol=1e-12)
-    assert len(near.gap) == 30 + 29
+    assert near["first"][:30].tolist() == [0] * 30
+    assert near["second"][:30].tolist() == list(range(1, 31))
+    assert_allclose(near["gap"], 0.5, atol=1e-12)
+    assert len(near["gap"]) == 30 + 29
 
 
 def test_chunks_do_not_change_a_bit(monkeypatch):
