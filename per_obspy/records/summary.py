@@ -2,17 +2,16 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from obspy import Trace
 
 from per_obspy.errors import Rejection
-from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
+from per_obspy.records.asdf import find_asdf_stations, is_asdf
 from per_obspy.records.earthquakes.choice import peak_motion
 from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
-from per_obspy.records.folder import find_stations, read_station, trace_row
+from per_obspy.records.folder import find_stations, trace_row
 
 
 class RecordInfo(NamedTuple):
@@ -106,13 +105,13 @@ def describe_records(
     """
     root = Path(path)
     if root.is_file() and is_asdf(root):
-        found, reader = find_asdf_stations(root, "*"), partial(read_asdf_station, tag="*")
+        found = find_asdf_stations(root, "*")
     else:
-        found, reader = find_stations(root, stationxml), partial(read_station)
+        found = find_stations(root, stationxml)
     # Station by station, so that one alone is in memory
     records, spans, rejected = list[RecordInfo](), list[RecordSpan](), list(found.rejected)
     for name, paths in found.stations.items():
-        stream, unread = reader(paths, found.inventory, name)
+        stream, unread = found.reader(paths, found.inventory, name)
         rejected += unread
         rejected += [trace_row(one, "it has no samples") for one in stream if not one.stats.npts]
         for trace in (one for one in stream if one.stats.npts):

@@ -4,22 +4,14 @@ import logging
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
-from obspy import Inventory, Stream, Trace, UTCDateTime
-from obspy.core import AttribDict
+from obspy import Trace, UTCDateTime
 from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
-from per_obspy.records.archive import LIMITS
-from per_obspy.records.earthquakes.earthquake import (
-    AgreedEvent,
-    Earthquake,
-    agreed_event,
-    origin_of,
-)
+from per_obspy.records.earthquakes.earthquake import AgreedEvent, agreed_event, origin_of
 from per_obspy.records.earthquakes.groups import (
     GAP,
     HOURS,
@@ -34,23 +26,31 @@ from per_obspy.records.earthquakes.groups import (
     span_of,
     station_files,
 )
-from per_obspy.records.folder import SourceContents, read_station
+from per_obspy.records.folder import Reader, RecordSource
 
 log = logging.getLogger(__name__)
-
-#: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
-Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
 
 _UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}
 
 
-class OneEarthquake(NamedTuple):
+def one_earthquake(
+    folder: RecordSource, records: config.Records, event: Event | None
+) -> tuple[list[RecordSource], list[dict[str, object]]]:
     """
-    Contents of a folder of which one earthquake is screened.
+    Separate the earthquake to screen from the others in a folder.
 
-    Attributes
+    Parameters
     ----------
-    contents : tuple of (SourceContents, Reader)
+    folder : RecordSource
+        From ``records.folder.find_stations``.
+    records : config.Records
+        Its ``time`` and ``event_gap``.
+    event : Event or None
+        The earthquake of the run.
+
+    Returns
+    -------
+    parts : list of RecordSource
         Stations whose files are read whole, with the rejections of all; then each station of which
         only a window is read.
     earthquakes : list of dict
@@ -59,81 +59,51 @@ class OneEarthquake(NamedTuple):
         earthquake by the headers of its records, see ``earthquakes.earthquake``; and
         ``joined_by``: the ``records.event_gap``, s, that takes a group for the screened earthquake,
         from which it may differ by its clocks only; else None.
-    """
-
-    contents: tuple[tuple[SourceContents, Reader], ...]
-    earthquakes: list[dict[str, object]]
-
-
-def one_earthquake(
-    found: SourceContents, records: config.Records, event: Event | None
-) -> OneEarthquake:
-    """
-    Separate the earthquake to screen from the others in a folder.
-
-    Parameters
-    ----------
-    found : SourceContents
-        Of the folder.
-    records : config.Records
-        Its ``time`` and ``event_gap``.
-    event : Event or None
-        The earthquake of the run.
 
     Raises
     ------
     CatalogError
         If no record is of the configured time or the origin time.
     """
-    gap, (time, source) = records.event_gap, _time(records, event)
-    groups = event_groups(found.records, gap)
-    reader: Reader = partial(read_station)
-    if records.archives != LIMITS:
-        reader = partial(read_station, limits=records.archives)
-    motion = partial(largest_motion, found, reader)
-    group = chosen_group(groups, time, source, motion, gap)
+    gap = records.event_gap
+    groups = event_groups(folder.records, gap)
+    time, source = event and origin_of(event).time, "records.event"
+    if records.time is not None:
+        time, source = UTCDateTime(records.time), "records.time"
+    group = chosen_group(groups, time, source, partial(largest_motion, folder), gap)
     alike = differ_by_clocks(groups, group)
-    joined = joining_gap([group, *alike])
-    facts = [_facts(other, group, joined if other in alike else None) for other in groups]
+    joined_by = joining_gap([group, *alike])
+    facts = [_facts(other, group, joined_by if other in alike else None) for other in groups]
     # Without an event of the configuration that of the headers counts
     if event is None:
-        reader = reader_of_event(reader, group_event(group, gap))
+        folder = folder._replace(reader=reader_of_event(folder.reader, group_event(group, gap)))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
-    others = [record for record in found.records if record.key not in members]
-    found = found._replace(rejected=(*found.rejected, *_rejections(others, group, alike)))
-    return OneEarthquake(_contents(found, group, {record.path for record in others}, reader), facts)
+    others = [record for record in folder.records if record.key not in members]
+    rows = _rejections(others, group, alike, joined_by)
+    return _parts(folder._replace(rejected=(*folder.rejected, *rows)), group, others), facts
 
 
-def read_station_of(
-    paths: Iterable[Path],
-    inventory: Inventory | None,
-    station: str | None = None,
-    *,
-    event: Earthquake,
-    **options: Any,
-) -> tuple[Stream, tuple[Rejection, ...]]:
-    """
-    Read a station as ``records.folder.read_station``, with the earthquake of most headers.
-
-    Parameters
-    ----------
-    paths, inventory, station, **options
-        As for ``read_station``.
-    event : Earthquake
-        Takes the place of ``stats.event`` of every trace.
-    """
-    stream, rejected = read_station(paths, inventory, station, **options)
-    for trace in stream:
-        trace.stats.event = AttribDict(event.words)
-    return stream, rejected
+def _facts(group: EventGroup, screened: EventGroup, gap: float | None) -> dict[str, object]:
+    """Return the facts of a group, with the gap that takes it for the screened one."""
+    headers = group_event(group)
+    return {
+        "start": group.label,
+        "stations": group.stations,
+        "records": len(group.records),
+        "undated": sum(not record.is_dated for record in group.records),
+        "screened": group is screened,
+        "headers": headers.facts if headers else None,
+        "joined_by": gap,
+    }
 
 
-def _contents(
-    found: SourceContents, group: EventGroup, mixed: set[Path], reader: Reader
-) -> tuple[tuple[SourceContents, Reader], ...]:
-    """Return the stations of a group with their readers; the first contents have rejections."""
-    whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
+def _parts(
+    folder: RecordSource, group: EventGroup, others: Iterable[RecordSpan]
+) -> list[RecordSource]:
+    """Return the stations of a group; the first part has the rejections."""
+    whole, windows = dict[str, tuple[Path, ...]](), list[RecordSource]()
+    mixed = {record.path for record in others}
     for station, paths in station_files(group.records).items():
         own = [record for record in group.records if record.station == station]
         limits = dict[str, UTCDateTime]()
@@ -142,22 +112,29 @@ def _contents(
             limits = _limits(group)
         # A file with records of several earthquakes is cut to the chosen one
         elif not mixed.isdisjoint(paths):
-            start, end = span_of(own)
-            limits = {"start": start, "end": end}
+            limits = dict(zip(("start", "end"), span_of(own), strict=True))
         # Stations of which only a window is read have a separate reader
         if limits:
-            part = found._replace(stations={station: paths}, rejected=())
-            windows.append((part, partial(reader, **limits)))
+            reader = partial(folder.reader, **limits)
+            part = folder._replace(stations={station: paths}, rejected=(), reader=reader)
+            windows.append(part)
         else:
             whole[station] = paths
-    return (found._replace(stations=whole), reader), *windows
+    return [folder._replace(stations=whole), *windows]
 
 
-def largest_motion(found: SourceContents, reader: Reader, group: EventGroup) -> float:
+def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
+    """Return the window of a group as a reader takes it; empty without any date."""
+    if group.window is None:
+        return {}
+    return {"start": group.window[0] - MARGIN, "end": group.window[1] + MARGIN}
+
+
+def largest_motion(folder: RecordSource, group: EventGroup) -> float:
     """Return the largest acceleration of a group's readable records, m/s2; 0 without any."""
     largest = 0.0
     for station, paths in station_files(group.records).items():
-        stream, _ = reader(paths, found.inventory, station, **_limits(group))
+        stream, _ = folder.reader(paths, folder.inventory, station, **_limits(group))
         for trace in stream:
             peak, unit = peak_motion(trace)
             largest = max(largest, peak if unit == "m/s2" else 0.0)
@@ -168,37 +145,19 @@ def peak_motion(trace: Trace) -> tuple[float, str]:
     """Return the largest distance from the mean and its unit; of raw counts by the sensitivity."""
     if not trace.stats.npts:
         return 0.0, ""
-    stats, scale = trace.stats, 1.0
-    if stats.units == "counts":
+    stats, scale, unit = trace.stats, 1.0, trace.stats.units
+    if unit == "counts":
         has_response = "response" in stats
         scale = 1.0 / stats.response.instrument_sensitivity.value if has_response else stats.calib
-    unit = _UNITS[stats.quantity] if stats.units == "counts" else stats.units
+        unit = _UNITS[stats.quantity]
     # Raw records have an offset
     return float(np.abs(trace.data - trace.data.mean()).max()) * scale, unit
 
 
-def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | None, str]:
-    """Return the time of the earthquake to screen, if one is known, and where it comes from."""
-    if records.time is not None:
-        return UTCDateTime(records.time), "records.time"
-    if event is None:
-        return None, ""
-    return origin_of(event).time, "records.event"
-
-
-def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
-    """Return the window of a group as a reader takes it; empty without any date."""
-    window = group.window
-    if window is None:
-        return {}
-    return {"start": window[0] - MARGIN, "end": window[1] + MARGIN}
-
-
 def _rejections(
-    records: Iterable[RecordSpan], screened: EventGroup, alike: list[EventGroup]
+    records: Iterable[RecordSpan], screened: EventGroup, alike: list[EventGroup], gap: float
 ) -> list[Rejection]:
     """Return the rows of records that are of another earthquake, or perhaps of another clock."""
-    gap = joining_gap([screened, *alike])
     by_clock = {record.key for group in alike for record in group.records}
     rows = list[Rejection]()
     for record in records:
@@ -227,42 +186,29 @@ def group_event(group: EventGroup, gap: float = GAP) -> AgreedEvent | None:
         Longest time from the origin to the start of the records, s; an origin at another time is
         no earthquake of these records.
     """
-    found = agreed_event((record.station, record.event) for record in group.records)
-    if found is None or found.event is None or not found.event.time:
-        return found
-    if follows(group, UTCDateTime(found.event.time), gap):
-        return found
+    headers = agreed_event((record.station, record.event) for record in group.records)
+    if headers is None or headers.event is None or not headers.event.time:
+        return headers
+    if follows(group, UTCDateTime(headers.event.time), gap):
+        return headers
     # An origin hours away: the headers or the clocks are wrong
-    stations = {record.station for record in group.records if record.event}
-    return AgreedEvent(None, 0, dict.fromkeys(sorted(stations), found.event) | found.others)
+    stations = sorted({record.station for record in group.records if record.event})
+    return AgreedEvent(None, 0, dict.fromkeys(stations, headers.event) | headers.others)
 
 
-def reader_of_event(reader: Reader, found: AgreedEvent | None) -> Reader:
+def reader_of_event(reader: Reader, headers: AgreedEvent | None) -> Reader:
     """Return a reader of stations whose records have the earthquake of most headers, if any has."""
-    if found is None:
+    if headers is None:
         return reader
     # Headers that contradict are for the user to judge
-    others = "; ".join(f"{name}: {event}" for name, event in found.others.items())
-    if others and found.event is None:
-        log.warning("headers of records describe no common earthquake: %s", shortened(others))
-    elif others:
-        message = "%d headers describe another earthquake than the %d of most, %s: %s"
-        log.warning(message, len(found.others), found.stations, found.event, shortened(others))
-    if found.event is None:
+    others = "; ".join(f"{name}: {event}" for name, event in headers.others.items())
+    if headers.event is None:
+        if others:
+            message = "headers of records describe no common earthquake: %s"
+            log.warning(message, shortened(others))
         return reader
-    return partial(read_station_of, event=found.event, **reader.keywords)
-
-
-def _facts(group: EventGroup, screened: EventGroup, gap: float | None) -> dict[str, object]:
-    """Return the facts of a group, with the gap that takes it for the screened one."""
-    undated = sum(not record.is_dated for record in group.records)
-    by_headers = group_event(group)
-    return {
-        "start": group.label,
-        "stations": group.stations,
-        "records": len(group.records),
-        "undated": undated,
-        "screened": group is screened,
-        "headers": by_headers.facts if by_headers else None,
-        "joined_by": gap,
-    }
+    if others:
+        message = "%d headers describe another earthquake than the %d of most, %s: %s"
+        count = len(headers.others)
+        log.warning(message, count, headers.stations, headers.event, shortened(others))
+    return partial(reader, event=headers.event)

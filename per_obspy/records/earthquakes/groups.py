@@ -42,9 +42,6 @@ _DAY = 86400.0
 #: or without a date.
 Kind = Literal["triggered", "continuous", "day", "undated"]
 
-#: Tells whether a record joins the records of a group.
-Fits = Callable[["list[RecordSpan]", "RecordSpan"], bool]
-
 
 class RecordSpan(NamedTuple):
     """
@@ -123,9 +120,7 @@ class EventGroup(NamedTuple):
         """Times of the first and the last sample, of triggered records if there are any."""
         dated = [record for record in self.records if record.is_dated]
         triggered = [record for record in dated if not record.is_continuous] or dated
-        if not triggered:
-            return None
-        return span_of(triggered)
+        return span_of(triggered) if triggered else None
 
     @property
     def label(self) -> str:
@@ -173,22 +168,47 @@ def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[Event
     kinds: dict[Kind, list[RecordSpan]] = defaultdict(list)
     for record in sorted(records, key=lambda one: (one.start.ns, one.record, str(one.path))):
         kinds[record.kind].append(record)
-    groups = _successive(kinds["triggered"], lambda group, one: one.start - group[0].start <= gap)
-    # Records that cannot found a separate group where there is one to join
-    alone = _without_group(groups, kinds["continuous"], _overlaps)
-    groups += _successive(alone, lambda group, one: one.start <= span_of(group)[1])
-    alone = _without_group(groups, kinds["day"], _is_near)
-    groups += _successive(alone, lambda group, one: one.start <= group[0].start)
+    # Only triggered records found a group where there is one to join
+    groups = _join(kinds["triggered"], [], _overlaps, lambda group: group[0].start + gap)
+    groups += _join(kinds["continuous"], groups, _overlaps, lambda group: span_of(group)[1])
+    groups += _join(kinds["day"], groups, _is_near, lambda group: group[0].start)
     _join_folders(groups, kinds["undated"])
-    groups.sort(key=lambda group: group[0].start.ns)
     # The earliest record has founded the group
+    groups.sort(key=lambda group: group[0].start.ns)
     return tuple(EventGroup(tuple(members)) for members in groups)
+
+
+def _join(
+    records: Sequence[RecordSpan],
+    groups: Sequence[list[RecordSpan]],
+    fits: Callable[[list[RecordSpan], RecordSpan], bool],
+    latest: Callable[[list[RecordSpan]], UTCDateTime],
+) -> list[list[RecordSpan]]:
+    """
+    Add records of one kind, sorted by start, to the groups that they fit, and group the others.
+
+    These join the new group before them if they start until its latest time.
+    """
+    new: list[list[RecordSpan]] = []
+    for record in records:
+        fitting = [group for group in groups if fits(group, record)]
+        # A day may hold several earthquakes, of which only one has the record
+        if fitting and record.kind == "day":
+            fitting = [max(fitting, key=lambda group: len({member.station for member in group}))]
+        if not fitting and new and record.start <= latest(new[-1]):
+            fitting = [new[-1]]
+        for group in fitting:
+            group.append(record)
+        if not fitting:
+            new.append([record])
+    return new
 
 
 def span_of(records: Iterable[RecordSpan]) -> tuple[UTCDateTime, UTCDateTime]:
     """Return the times of the first and the last sample of some records."""
-    starts, ends = zip(*((record.start, record.end) for record in records), strict=True)
-    return min(starts), max(ends)
+    spans = list(records)
+    start = min(record.start for record in spans)
+    return start, max(record.end for record in spans)
 
 
 def chosen_group(
@@ -258,38 +278,22 @@ def differ_by_clocks(groups: Sequence[EventGroup], screened: EventGroup) -> list
 
 def joining_gap(groups: Sequence[EventGroup]) -> float:
     """Return the gap, s, with which groups are one: up to the next 100 s; 0 without dates."""
-    starts = [record.start for group in groups for record in group.records if record.is_dated]
+    records = (record for group in groups for record in group.records)
+    starts = [record.start for record in records if record.is_dated]
     return 100.0 * math.ceil(float(max(starts) - min(starts)) / 100.0) if starts else 0.0
 
 
-def _successive(records: Sequence[RecordSpan], joins: Fits) -> list[list[RecordSpan]]:
-    """Return groups of records, sorted by start, each of which joins the group before it."""
-    groups: list[list[RecordSpan]] = []
-    for record in records:
-        if groups and joins(groups[-1], record):
-            groups[-1].append(record)
-        else:
-            groups.append([record])
-    return groups
-
-
-def _without_group(
-    groups: list[list[RecordSpan]],
-    records: Sequence[RecordSpan],
-    fits: Fits,
-) -> list[RecordSpan]:
-    """Add records to the groups that they fit, and return those that fit none."""
-    without: list[RecordSpan] = []
-    for record in records:
-        fitting = [group for group in groups if fits(group, record)]
-        # A day may hold several earthquakes, of which only one has the record
-        if fitting and record.kind == "day":
-            fitting = [max(fitting, key=lambda group: len({member.station for member in group}))]
-        for group in fitting:
+def _join_folders(groups: list[list[RecordSpan]], undated: list[RecordSpan]) -> None:
+    """Add records without a date to the group that has most records in their folder."""
+    counts = [Counter(record.path.parent for record in group) for group in groups]
+    for record in undated:
+        in_folder = [count[record.path.parent] for count in counts]
+        most = max(in_folder, default=0)
+        # Without a located group in their folder they join whichever group is screened
+        for group in [groups[in_folder.index(most)]] if most else groups:
             group.append(record)
-        if not fitting:
-            without.append(record)
-    return without
+    if undated and not groups:
+        groups.append(undated)
 
 
 def _overlaps(group: list[RecordSpan], record: RecordSpan) -> bool:
@@ -301,25 +305,6 @@ def _overlaps(group: list[RecordSpan], record: RecordSpan) -> bool:
 def _is_near(group: list[RecordSpan], record: RecordSpan) -> bool:
     """Return whether a group may be of the day of a record that starts at midnight."""
     return bool(-0.5 * _DAY <= group[0].start - record.start <= 1.5 * _DAY)
-
-
-def _join_folders(groups: list[list[RecordSpan]], undated: Sequence[RecordSpan]) -> None:
-    """Add records without a date to the group that has most records in their folder."""
-    counts = list(map(_folder_counts, groups))
-    for record in undated:
-        in_folder = [count[record.path.parent] for count in counts]
-        # Without a located group in their folder they join whichever group is screened
-        most = max(in_folder, default=0)
-        joined = [groups[in_folder.index(most)]] if most else groups
-        for group in joined:
-            group.append(record)
-    if undated and not groups:
-        groups.append(list(undated))
-
-
-def _folder_counts(group: Sequence[RecordSpan]) -> Counter[Path]:
-    """Return the number of records of a group in every folder."""
-    return Counter(record.path.parent for record in group)
 
 
 def follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
