@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -341,34 +341,36 @@ def one_series(stream: Stream) -> tuple[Stream, list[Rejection]]:
     of 10 s), of several one in physical units, of these the first by format and file. A form that
     does not overlap, in time or by its channel code, is another record.
     """
-    accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
+    accelerations = {trace.id for trace in stream if _form(trace)[2] == "m/s2"}
     left_out = dict[int, Rejection]()
     # Channel and state, format and unit -> series
     forms: dict[tuple[str, str], dict[tuple[str, str], list[Trace]]] = defaultdict(dict)
     for trace in stream:
-        level, *form, units = _form(trace)
-        if units in _INTEGRALS and trace.id in accelerations:
-            reason = f"{_INTEGRALS[units]} series, acceleration is read instead"
+        level, form, units = _form(trace)
+        if trace.id in accelerations and units in _INTEGRALS:
+            kind = _INTEGRALS[units]
+            reason = f"{kind} series, acceleration is read instead"
             left_out[id(trace)] = trace_row(trace, reason)
         else:
-            forms[trace.id, level].setdefault((*form, units), []).append(trace)
+            forms[trace.id, level].setdefault((form, units), []).append(trace)
     for channel in forms.values():
-        best, *others = sorted(channel.values(), key=_rank)
-        left_out |= {id(trace): row for trace in chain(*others) for row in _double(trace, best)}
+        left_out |= _doubles(*sorted(channel.values(), key=_rank))
     # The order of the files stays
-    stays = Stream([trace for trace in stream if id(trace) not in left_out])
-    return stays, list(left_out.values())
+    stays = (trace for trace in stream if id(trace) not in left_out)
+    return Stream([*stays]), [*left_out.values()]
 
 
-def _double(trace: Trace, best: list[Trace]) -> list[Rejection]:
-    """Return the row of a series of which the best form of its channel has samples too."""
-    for same in best:
+def _doubles(best: list[Trace], *others: list[Trace]) -> dict[int, Rejection]:
+    """Return the rows of series that the best form of their channel has too, by their object."""
+    rows = {}
+    for trace, same in product(chain(*others), best):
+        # Only where both have samples of the same time
         start = max(trace.stats.starttime, same.stats.starttime)
-        if min(trace.stats.endtime, same.stats.endtime) > start:
+        if id(trace) not in rows and min(trace.stats.endtime, same.stats.endtime) > start:
             words = " in ".join(_form(same)[1:]).strip()
             reason = f"the same record as {same.stats.source} ({words}), which is read instead"
-            return [trace_row(trace, reason)]
-    return []
+            rows[id(trace)] = trace_row(trace, reason)
+    return rows
 
 
 def _form(trace: Trace) -> tuple[str, str, str]:

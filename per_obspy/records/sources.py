@@ -16,15 +16,19 @@ from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.asdf import find_asdf_stations, has_event
-from per_obspy.records.earthquakes.choice import group_event, one_earthquake, reader_of_event
-from per_obspy.records.earthquakes.groups import event_groups
+from per_obspy.records.earthquakes.groups import (
+    event_groups,
+    group_event,
+    one_earthquake,
+    reader_of_event,
+)
 from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
 from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import Files, Reader, RecordSource, find_stations
 from per_obspy.records.metadata import merged_inventory
 from per_obspy.records.sds import find_sds_stations
-from per_obspy.records.text_table import read_columns
+from per_obspy.records.text_table import read_described
 
 log = logging.getLogger(__name__)
 
@@ -66,7 +70,7 @@ class Sources(NamedTuple):
     hashes : dict
         Hash of every file that was read on the way.
     earthquakes : list of dict
-        Facts of every earthquake in the folder, see ``earthquakes.choice.one_earthquake``.
+        Facts of every earthquake in the folder, see ``earthquakes.groups.one_earthquake``.
     expected : frozenset of str
         Names of all stations of metadata and of lists of services, with records or without.
     waiting : tuple of Path
@@ -225,5 +229,4 @@ def _event_file(records: config.Records, fetched: Fetched | None) -> EventFile |
 
 def read_table(*_: object, table: config.Columns) -> tuple[Stream, tuple[Rejection, ...]]:
     """Read a plain table of samples; file, metadata and name are in its description."""
-    description = table.model_dump()
-    return read_columns(description.pop("file"), **description), ()
+    return read_described(table), ()

@@ -9,8 +9,7 @@ from obspy import Trace
 
 from per_obspy.errors import Rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf
-from per_obspy.records.earthquakes.choice import peak_motion
-from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
+from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, peak_motion, record_span
 from per_obspy.records.folder import find_stations, trace_row
 
 

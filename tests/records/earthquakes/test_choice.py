@@ -12,9 +12,13 @@ from obspy.core.event import Event, Origin
 
 from per_obspy.config import Records, Scenario
 from per_obspy.errors import CatalogError
-from per_obspy.records.earthquakes.choice import largest_motion, one_earthquake, peak_motion
-from per_obspy.records.earthquakes.groups import event_groups
-from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.earthquakes.groups import (
+    event_groups,
+    largest_motion,
+    one_earthquake,
+    peak_motion,
+)
+from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import Sources, find_sources
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
