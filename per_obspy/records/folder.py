@@ -256,7 +256,7 @@ def _read_files(
 ) -> tuple[list[_File], list[Rejection], tuple[Path, ...]]:
     """Read the files of a folder; return unreadable ones, and those that are still written."""
     # A file counts as the only one of its folder
-    paths, rejected = ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
+    paths, rejected = ([folder], []) if folder.is_file() else files_below(folder)
     states, waiting = _settled(folder, paths, settle)
     files = []
     for path in sorted({*paths} - waiting):
@@ -342,7 +342,7 @@ def one_series(stream: Stream) -> tuple[Stream, list[Rejection]]:
     does not overlap, in time or by its channel code, is another record.
     """
     accelerations = {trace.id for trace in stream if _form(trace)[2] == "m/s2"}
-    left_out = dict[int, Rejection]()
+    left_out = {}
     # Channel and state, format and unit -> series
     forms: dict[tuple[str, str], dict[tuple[str, str], list[Trace]]] = defaultdict(dict)
     for trace in stream:

@@ -12,6 +12,15 @@ from per_obspy.records.asdf import find_asdf_stations, is_asdf
 from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, peak_motion, record_span
 from per_obspy.records.folder import find_stations, trace_row
 
+#: Columns that are words of ``trace.stats``.
+_SAME_WORDS = (
+    "simulated",
+    "coordinates_source",
+    "coordinates_conflict",
+    "site_class",
+    "vs30",
+)
+
 
 class RecordInfo(NamedTuple):
     """
@@ -108,7 +117,7 @@ def describe_records(
     else:
         found = find_stations(root, stationxml)
     # Station by station, so that one alone is in memory
-    records, spans, rejected = list[RecordInfo](), list[RecordSpan](), list(found.rejected)
+    records, spans, rejected = [], [], list(found.rejected)
     for name, paths in found.stations.items():
         stream, unread = found.reader(paths, found.inventory, name)
         rejected += unread
@@ -151,9 +160,5 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
         peak=peak,
         unit=unit,
         file=source.name if source == root else str(source.relative_to(root)),
-        simulated=stats.get("simulated", False),
-        coordinates_source=stats.get("coordinates_source", ""),
-        coordinates_conflict=stats.get("coordinates_conflict", ""),
-        site_class=stats.get("site_class", ""),
-        vs30=stats.get("vs30"),
+        **{name: stats[name] for name in _SAME_WORDS if name in stats},
     )

@@ -407,11 +407,11 @@ def _parts(
     folder: "RecordSource", group: EventGroup, others: Iterable[RecordSpan]
 ) -> "list[RecordSource]":
     """Return the stations of a group; the first part has the rejections."""
-    whole, windows = dict[str, tuple[Path, ...]](), []
+    whole, windows = {}, []
     mixed = {record.path for record in others}
     for station, paths in station_files(group.records).items():
         own = [record for record in group.records if record.station == station]
-        limits = dict[str, UTCDateTime]()
+        limits = {}
         # Hours of record are cut to the time of the triggered records of all stations
         if any(record.end - record.start > HOURS for record in own):
             limits = _limits(group)
@@ -464,7 +464,7 @@ def _rejections(
 ) -> list[Rejection]:
     """Return the rows of records that are of another earthquake, or perhaps of another clock."""
     by_clock = {record.key for group in alike for record in group.records}
-    rows = list[Rejection]()
+    rows = []
     for record in records:
         start = str(record.start)[:16] if record.is_dated else "without a date"
         reason = f"belongs to another earthquake: starts {start}, the screened one {screened.label}"
