@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, Rejection
-from per_obspy.records.folder import SourceContents
+from per_obspy.records.folder import Files, RecordSource
 from per_obspy.records.metadata import merged_inventory, with_metadata
 from per_obspy.records.obspy_readers import LARGEST_UNPACKED, read_bytes_with_obspy
 from per_obspy.units import motion_unit
@@ -48,7 +49,7 @@ def is_asdf(path: Path) -> bool:
         return file.read(len(ASDF_MARK)) == ASDF_MARK
 
 
-def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> SourceContents:
+def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> RecordSource:
     """
     Find the stations that have waveforms of a tag.
 
@@ -66,6 +67,7 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> SourceCo
         If it is no ASDF file or has no waveform of the tag.
     """
     inventories, rejected = [], []
+    # StationXML of every station, which may be damaged
     with _opened(Path(path)) as file:
         groups = file["Waveforms"].groups if "Waveforms" in file.groups else {}
         tagged = [name for name in sorted(groups) if _names(groups[name], tag)]
@@ -73,15 +75,15 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> SourceCo
             tags = {_tag(name) for group in groups.values() for name in _names(group, "*")}
             problem = f"has no waveform of tag {tag}, only of {', '.join(sorted(tags)) or 'none'}"
             raise CatalogError(str(path), problem)
-        # StationXML of every station, which may be damaged
         for name in tagged:
             try:
                 inventories += _inventories(groups[name], f"{path}/{name}")
             except RecordRejected as rejection:
                 rejected.append(Rejection("file", name, str(path), None, rejection.reasons))
     # All stations are in the one file
-    stations: dict[str, tuple[Path, ...]] = dict.fromkeys(tagged, (Path(path),))
-    return SourceContents(stations, merged_inventory(inventories), tuple(rejected))
+    stations: Files = dict.fromkeys(tagged, (Path(path),))
+    reader = partial(read_asdf_station, tag=tag)
+    return RecordSource(stations, merged_inventory(inventories), tuple(rejected), reader=reader)
 
 
 def _inventories(group: Any, name: str) -> list[Inventory]:

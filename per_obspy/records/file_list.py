@@ -54,7 +54,7 @@ def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
     if not folder.is_dir():
         raise CatalogError(str(folder), "is neither a folder nor a regular file")
     unlisted: list[OSError] = []
-    paths, problems = [], dict[Path, str]()
+    paths, problems = [], {}
     # Links to folders are among the folders, and are not entered
     for parent, folders, names in os.walk(folder, onerror=unlisted.append):
         for path in (Path(parent, name) for name in (*folders, *names)):
@@ -165,7 +165,7 @@ def input_files(records: config.Records | None, fetched: "Fetched | None") -> li
         places += [fetched.folder, fetched.event.path if fetched.event else None]
     places += [records.asdf.file] if records.asdf else []
     places += [records.shakemap, records.shakemap_uncertainty]
-    files = list[Path]()
+    files = []
     for place in filter(None, places):
         files += files_below(place)[0] if place.is_dir() else [place]
     files += _day_files(records, records.sds) if records.sds else []

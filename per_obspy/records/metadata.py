@@ -235,7 +235,7 @@ def _read_station_text(path: Path, content: bytes) -> Metadata:
 
 def _refused_lines(path: Path, head: str, lines: Mapping[int, str]) -> dict[int, str]:
     """Return the number of each line that ObsPy refuses, and why."""
-    refused = dict[int, str]()
+    refused = {}
     for number, line in lines.items():
         try:
             _station_text(path, head, line)

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 
 import obspy
@@ -11,7 +12,7 @@ from obspy import Inventory, Stream, UTCDateTime
 from per_obspy.errors import CatalogError, RecordRejected, Rejection, reason_of
 from per_obspy.records.archive import read_file
 from per_obspy.records.file_list import file_row
-from per_obspy.records.folder import SourceContents, read_station
+from per_obspy.records.folder import RecordSource, read_station
 from per_obspy.records.metadata import merged_inventory, read_inventories
 from per_obspy.records.obspy_readers import read_content
 
@@ -20,7 +21,7 @@ _DAY = 86400.0  # s
 
 def find_sds_stations(
     archive: str | Path, start: UTCDateTime, end: UTCDateTime, stationxml: str | Path | None = None
-) -> SourceContents:
+) -> RecordSource:
     """
     Find the stations of an SDS archive that have day files in a time window.
 
@@ -59,7 +60,8 @@ def find_sds_stations(
     # Metadata are outside the archive
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     stations = {name: tuple(files[name]) for name in sorted(files)}
-    return SourceContents(stations, merged_inventory(inventories), unlisted)
+    reader = partial(read_sds_station, start=start, end=end)
+    return RecordSource(stations, merged_inventory(inventories), unlisted, reader=reader)
 
 
 def _day_files(

@@ -3,12 +3,14 @@
 import re
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from per_obspy.checks import FloatArray
@@ -21,6 +23,15 @@ REQUIRED = ("PSA03", "PSA10", "PSA30")
 
 #: Most bytes of a grid, unpacked: ten times the largest that the USGS offers.
 LARGEST_FILE = 1_000_000_000
+
+
+#: fact of an earthquake -> attribute of the head, smallest and largest value, factor to SI
+_FACTS = {
+    "magnitude": ("magnitude", -2.0, 10.0, 1.0),
+    "longitude": ("lon", -180.0, 360.0, 1.0),
+    "latitude": ("lat", -90.0, 90.0, 1.0),
+    "depth": ("depth", -10.0, 1000.0, 1000.0),
+}
 
 
 class _Kind(NamedTuple):
@@ -49,16 +60,17 @@ _HEAD = 10_000
 
 _AXES = ("latitude", "longitude")
 
+#: Meanings of the two variables that have periods.
+_MEANINGS = ("pseudo-spectral acceleration at 5 % damping", "log-standard deviation of psa")
+
 
 class _Grid(NamedTuple):
     """A grid file."""
 
-    source: str  # path, for messages
     attributes: dict[str, str]  # path, and event and version of the map
-    longitude: FloatArray  # degrees, rising
-    latitude: FloatArray  # degrees, rising
-    fields: dict[str, FloatArray]  # name -> (n_latitudes, n_longitudes), in the unit of the file
-    units: dict[str, str]  # name -> unit
+    units: dict[str, str]  # of each field
+    shape: tuple[int, int]  # latitudes and longitudes
+    table: pd.DataFrame  # fields in the unit of the file, by latitude and longitude, degrees
 
 
 def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
@@ -88,30 +100,27 @@ def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
         shape than its header has, or a value that is missing or implausible.
     """
     grid = _read(path)
-    if missing := [name for name in REQUIRED if name not in grid.fields]:
-        raise _no_field(grid, ", ".join(missing))
     # By period: PSA03 is 0.3 s
-    names = sorted(name for name in grid.fields if re.fullmatch(r"PSA\d\d", name))
-    meaning = "pseudo-spectral acceleration at 5 % damping"
-    variables = {"psa": _variable(grid, names, _ACCELERATION, meaning)}
+    names = sorted(name for name in grid.units if re.fullmatch(r"PSA\d\d", name))
+    _require_fields(grid, *REQUIRED)
+    variables = {"psa": _variable(grid, names, _ACCELERATION, _MEANINGS[0])}
     # The deviation, from a separate file or from the grid
-    if uncertainty or all(f"STD{name}" in grid.fields for name in names):
-        variables["psa_log_std"] = _log_std(grid, names, uncertainty)
+    deviations = [f"STD{name}" for name in names]
+    other = _read_at_nodes(uncertainty, grid) if uncertainty else grid
+    if uncertainty or set(deviations) <= set(grid.units):
+        variables["psa_log_std"] = _variable(other, deviations, _DEVIATION, _MEANINGS[1])
     for variable, (name, kind, meaning) in _OPTIONAL.items():
-        if name in grid.fields:
+        if name in grid.units:
             variables[variable] = _variable(grid, name, kind, meaning)
-    axes = {
-        "period": [int(name[-2:]) / 10.0 for name in names],
-        "latitude": grid.latitude,
-        "longitude": grid.longitude,
-    }
-    return xr.Dataset(variables, coords=axes, attrs=grid.attributes)
+    axes = {name: grid.table.index.unique(name) for name in _AXES}
+    periods = [int(name[-2:]) / 10.0 for name in names]
+    return xr.Dataset(variables, coords={"period": periods, **axes}, attrs=grid.attributes)
 
 
 def is_scenario(path: Path) -> bool:
     """Return whether a ShakeMap is of a simulated earthquake, from the head of its grid."""
-    head = _text(path)[:_HEAD].upper()
-    return re.search(r"SHAKEMAP_EVENT_TYPE\s*=\s*[\"']SCENARIO[\"']", head) is not None
+    kinds = (tag.get("shakemap_event_type", "").upper() for tag in _head_tags(path).values())
+    return "SCENARIO" in kinds
 
 
 def map_event(path: Path) -> dict[str, object]:
@@ -132,16 +141,14 @@ def map_event(path: Path) -> dict[str, object]:
     tags = _head_tags(path)
     event, root = tags.get("event", {}), tags.get("shakemap_grid", {})
     time = re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", event.get("event_timestamp", ""))
-    # Kilometres become metres
-    facts = {
-        "time": time[0] if time else None,
-        "magnitude": _within(event.get("magnitude"), -2.0, 10.0),
-        "longitude": _within(event.get("lon"), -180.0, 360.0),
-        "latitude": _within(event.get("lat"), -90.0, 90.0),
-        "depth": _within(event.get("depth"), -10.0, 1000.0, 1000.0),
-        "map": root.get("event_id") or root.get("shakemap_id"),
-        "version": root.get("shakemap_version"),
-    }
+    facts: dict[str, object] = {"time": time and time[0]}
+    # Those that are no number or implausible are left out
+    for name, (attribute, low, high, factor) in _FACTS.items():
+        with suppress(ValueError):
+            value = float(event.get(attribute, ""))
+            facts[name] = factor * value if low <= value <= high else None
+    facts["map"] = root.get("event_id") or root.get("shakemap_id")
+    facts["version"] = root.get("shakemap_version")
     return {name: value for name, value in facts.items() if value is not None}
 
 
@@ -157,14 +164,6 @@ def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
         return {}
 
 
-def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> float | None:
-    """Return a number times a factor, None where it is none or outside its limits."""
-    try:
-        return factor * value if low <= (value := float(text or "")) <= high else None
-    except ValueError:
-        return None
-
-
 def _variable(grid: _Grid, names: str | list[str], kind: _Kind, meaning: str) -> Any:
     """Return a field in SI as a variable of a Dataset, or the fields of all periods."""
     attributes = {"units": kind.unit, "long_name": meaning}
@@ -173,54 +172,68 @@ def _variable(grid: _Grid, names: str | list[str], kind: _Kind, meaning: str) ->
     return ("period", *_AXES), np.stack([_values(grid, name, kind) for name in names]), attributes
 
 
-def _log_std(grid: _Grid, names: list[str], uncertainty: Path | None) -> Any:
-    """Return the log-standard deviation of spectral acceleration, on the grid of the map."""
-    other = _read(uncertainty) if uncertainty else grid
-    for name in ("longitude", "latitude"):
-        if not np.array_equal(getattr(grid, name), getattr(other, name)):
-            raise CatalogError(other.source, f"its {name}s are not those of {grid.source}")
-    fields = [f"STD{name}" for name in names]
-    return _variable(other, fields, _DEVIATION, "log-standard deviation of psa")
+def _require_fields(grid: _Grid, *names: str) -> None:
+    """Refuse a map without some fields."""
+    if missing := ", ".join(name for name in names if name not in grid.units):
+        problem = f"has no field {missing}, only {', '.join(grid.units)}"
+        raise CatalogError(grid.attributes["source"], problem)
 
 
-def _no_field(grid: _Grid, names: str) -> CatalogError:
-    """Return the error of a map without some fields."""
-    return CatalogError(grid.source, f"has no field {names}, only {', '.join(grid.fields)}")
+def _read_at_nodes(path: Path, grid: _Grid) -> _Grid:
+    """Read another grid file, which must have the nodes of the first."""
+    other = _read(path)
+    for name in reversed(_AXES):
+        if not other.table.index.unique(name).equals(grid.table.index.unique(name)):
+            source = grid.attributes["source"]
+            raise CatalogError(str(path), f"its {name}s are not those of {source}")
+    return other
 
 
 def _values(grid: _Grid, name: str, kind: _Kind) -> FloatArray:
     """Return a field in SI; its unit must be one of its kind, all its values plausible."""
-    if name not in grid.fields:
-        raise _no_field(grid, name)
-    unit, values = grid.units[name], grid.fields[name]
+    _require_fields(grid, name)
+    source, unit, values = grid.attributes["source"], grid.units[name], grid.table[name]
     # Versions of maps differ in the spelling of units
     if unit not in kind.units:
         problem = f"{name} is in {unit!r}, not in one of {', '.join(kind.units)}"
-        raise CatalogError(grid.source, problem)
+        raise CatalogError(source, problem)
     # No number, negative or implausibly large: the first of them with its place
-    bad = ~((values >= 0.0) & (values <= kind.largest))
+    bad = ~values.between(0.0, kind.largest)
     if bad.any():
-        row, column = np.unravel_index(int(np.argmax(bad)), bad.shape)
-        place = f"longitude {grid.longitude[column]:g}, latitude {grid.latitude[row]:g}"
-        raise CatalogError(grid.source, f"{name} = {values[row, column]:g} {unit} at {place}")
-    return values * kind.units[unit]
+        first = int(np.argmax(bad))
+        latitude, longitude = grid.table.index[first]
+        place = f"longitude {longitude:g}, latitude {latitude:g}"
+        raise CatalogError(source, f"{name} = {values.iloc[first]:g} {unit} at {place}")
+    return values.to_numpy().reshape(grid.shape) * kind.units[unit]
 
 
 def _read(path: Path) -> _Grid:
     """Read a grid file."""
     source, root = str(path), _root(path)
     units, size = _units(source, root), _size(source, root)
-    fields = dict(zip(units, _rows(source, root, len(units), size).T, strict=True))
+    table = pd.DataFrame(_rows(source, root, len(units), size), columns=[*units])
     # Every row has its node's coordinates
-    if missing := [name for name in ("LON", "LAT") if name not in fields]:
-        raise CatalogError(source, f"has no field {', '.join(missing)}, only {', '.join(fields)}")
-    fields["LON"] = _unbroken(fields["LON"])
-    # Rows from south to north, in each from west to east
-    order = np.lexsort((fields["LON"], fields["LAT"]))
-    fields = {name: values[order].reshape(size) for name, values in fields.items()}
     attributes = {name: root.attrib[name] for name in _VERSION if name in root.attrib}
-    axes = _axes(source, fields)
-    return _Grid(source, {"source": source, **attributes}, *axes, fields, units)
+    grid = _Grid({"source": source, **attributes}, units, size, table)
+    _require_fields(grid, "LON", "LAT")
+    # Rows from south to north, in each from west to east
+    return grid._replace(table=table.set_index(_nodes(source, table, size)).sort_index())
+
+
+def _nodes(source: str, table: pd.DataFrame, size: tuple[int, int]) -> pd.MultiIndex:
+    """Return latitude and longitude of every row, which form a grid, degrees."""
+    table["LON"] = _unbroken(table["LON"].to_numpy())
+    for name, limit in (("LON", 540.0), ("LAT", 90.0)):
+        wrong = table[name][~table[name].between(-limit, limit)]
+        if not wrong.empty:
+            problem = f"{name} = {wrong.iloc[0]:g} is not between {-limit:g} and {limit:g}"
+            raise CatalogError(source, problem)
+    nodes = pd.MultiIndex.from_frame(table[["LAT", "LON"]], names=_AXES)
+    east = nodes.levels[1]
+    # A whole turn would repeat a meridian
+    if nodes.has_duplicates or nodes.levshape != size or east[-1] - east[0] >= 360.0:
+        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
+    return nodes
 
 
 def _root(path: Path) -> ElementTree.Element:
@@ -325,21 +338,3 @@ def _unbroken(longitude: FloatArray) -> FloatArray:
     if not steps.size or steps[hole] <= east[0] + 360.0 - east[-1]:
         return longitude
     return np.where(longitude <= east[hole], longitude + 360.0, longitude)
-
-
-def _axes(source: str, fields: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return longitudes and latitudes of a table sorted by latitude, then longitude, degrees."""
-    for name, limit in (("LON", 540.0), ("LAT", 90.0)):
-        wrong = fields[name][~(np.abs(fields[name]) <= limit)]
-        if wrong.size:
-            problem = f"{name} = {wrong[0]:g} is not between {-limit:g} and {limit:g}"
-            raise CatalogError(source, problem)
-    longitude, latitude = fields["LON"], fields["LAT"]
-    east, north = longitude[0], latitude[:, 0]
-    # All rows have the same longitudes, all columns the same latitudes
-    regular = (longitude == east).all() and (latitude == north[:, None]).all()
-    rising = (np.diff(east) > 0).all() and (np.diff(north) > 0).all()
-    # A whole turn would repeat a meridian
-    if not regular or not rising or east[-1] - east[0] >= 360.0:
-        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
-    return east, north

@@ -3,35 +3,32 @@
 import logging
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from obspy import Inventory, Stream
-from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archive import hash_if_readable
-from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.earthquakes.choice import (
-    OneEarthquake,
-    Reader,
+from per_obspy.records.asdf import find_asdf_stations, has_event
+from per_obspy.records.earthquakes.groups import (
+    event_groups,
     group_event,
     one_earthquake,
     reader_of_event,
 )
-from per_obspy.records.earthquakes.groups import event_groups
 from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
 from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
-from per_obspy.records.folder import SourceContents, find_stations, read_station
+from per_obspy.records.folder import Files, Reader, RecordSource, find_stations
 from per_obspy.records.metadata import merged_inventory
-from per_obspy.records.sds import find_sds_stations, read_sds_station
-from per_obspy.records.text_table import read_columns
+from per_obspy.records.sds import find_sds_stations
+from per_obspy.records.text_table import read_described
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +70,7 @@ class Sources(NamedTuple):
     hashes : dict
         Hash of every file that was read on the way.
     earthquakes : list of dict
-        Facts of every earthquake in the folder, see ``records.earthquakes.choice.OneEarthquake``.
+        Facts of every earthquake in the folder, see ``earthquakes.groups.one_earthquake``.
     expected : frozenset of str
         Names of all stations of metadata and of lists of services, with records or without.
     waiting : tuple of Path
@@ -111,19 +108,27 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
         If a source is missing or empty, or the event cannot be read.
     """
     # A wrong event stops the run here, not every station
-    event = _event(records, fetched)
-    earthquake = event and event.event
-    folder = None
+    file = _event_file(records, fetched)
+    event = file and file.event
+    opened, earthquakes = list[RecordSource](), list[dict[str, object]]()
+    for table in records.columns:
+        files: Files = {f"{table.network}.{table.station}": (table.file,)}
+        opened.append(RecordSource(files, reader=partial(read_table, table=table)))
     # Of several earthquakes in the folder one is screened
     if records.folder:
         limits = records.archives
-        found = find_stations(records.folder, records.stationxml, limits, records.settle)
-        folder = one_earthquake(found, records, earthquake)
-    sources = _served(_contents(records, fetched, earthquake, folder), event)
-    if folder is None:
-        return sources
-    waiting = folder.contents[0][0].waiting
-    return sources._replace(earthquakes=folder.earthquakes, waiting=waiting)
+        folder = find_stations(records.folder, records.stationxml, limits, records.settle)
+        parts, earthquakes = one_earthquake(folder, records, event)
+        opened += parts
+    if records.sds:
+        times = window(records.sds, event)
+        opened.append(find_sds_stations(records.sds.folder, *times, records.stationxml))
+    # Records processed by others and by services come last
+    if records.asdf:
+        opened.append(find_asdf_stations(records.asdf.file, records.asdf.tag))
+    if fetched:
+        opened.append(fetched_stations(fetched))
+    return _served(opened, file, earthquakes)
 
 
 def find_path_sources(paths: Sequence[Path]) -> Sources:
@@ -135,8 +140,8 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     CatalogError
         If a path is missing or holds no record.
     """
-    found = [find_stations(path) for path in paths]
-    groups = event_groups([record for contents in found for record in contents.records])
+    opened = [find_stations(path) for path in paths]
+    groups = event_groups([record for source in opened for record in source.records])
     if len(groups) > 1:
         log.warning(
             "records of %d earthquakes are used together, they start %s: "
@@ -145,36 +150,47 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
             ", ".join(group.label for group in groups),
         )
     # Records of one earthquake have that of most headers
-    agreed = group_event(groups[0]) if len(groups) == 1 else None
-    reader = reader_of_event(partial(read_station), agreed)
+    headers = group_event(groups[0]) if len(groups) == 1 else None
     # Metadata in one of the paths serves stations of all
-    files = defaultdict[str, tuple[Path, ...]](tuple)
-    hashes: dict[Path, str] = {}
-    for contents in found:
-        hashes |= contents.hashes
-        for name, station_files in contents.stations.items():
+    files, hashes = defaultdict[str, tuple[Path, ...]](tuple), dict[Path, str]()
+    for source in opened:
+        hashes |= source.hashes
+        for name, station_files in source.stations.items():
             files[name] += station_files
-    inventory = merged_inventory([contents.inventory for contents in found if contents.inventory])
-    rejected = tuple(row for contents in found for row in contents.rejected)
-    return _served([(SourceContents(files, inventory, rejected, hashes), reader)], None)
+    inventory = merged_inventory([one.inventory for one in opened if one.inventory])
+    rejected = tuple(row for source in opened for row in source.rejected)
+    joined = RecordSource(files, inventory, rejected, hashes)
+    return _served([joined._replace(reader=reader_of_event(joined.reader, headers))], None, [])
 
 
-def _served(contents: Iterable[tuple[SourceContents, Reader]], event: EventFile | None) -> Sources:
+def _served(
+    opened: Iterable[RecordSource], event: EventFile | None, earthquakes: list[dict[str, object]]
+) -> Sources:
     """Return each station of the first source that has it, with what all sources reject."""
-    sources = Sources({}, event, (), {event.path: event.hash} if event else {}, [])
+    sources = Sources({}, event, (), {event.path: event.hash} if event else {}, earthquakes)
     rejected, expected = list[Rejection](), set[str]()
-    for found, reader in contents:
-        rejected += found.rejected
-        expected |= _expected(found)
-        sources.hashes.update(found.hashes)
+    for source in opened:
+        sources = sources._replace(waiting=sources.waiting or source.waiting)
+        sources.hashes.update(source.hashes)
+        rejected += source.rejected
+        expected |= _expected(source)
         # The first source that has a station serves it
-        for name, paths in found.stations.items():
+        for name, paths in source.stations.items():
             reason = _unusable(name, paths, sources.stations.get(name))
             if reason is not None:
                 rejected.append(reason)
-                continue
-            sources.stations[name] = _station(name, paths, found.inventory, reader, sources.hashes)
+            else:
+                sources.stations[name] = _station(name, paths, source, sources.hashes)
+    expected |= set(sources.stations)
     return sources._replace(rejected=tuple(rejected), expected=frozenset(expected))
+
+
+def _expected(source: RecordSource) -> set[str]:
+    """Return the stations of the metadata and list of a source, with records or without."""
+    networks = source.inventory or ()
+    codes = {f"{network.code}.{place.code}" for network in networks for place in network}
+    listed = (row for row in source.rejected if row.kind == "station" and row.source == FDSN)
+    return codes.union(row.name for row in listed)
 
 
 def _unusable(
@@ -191,33 +207,17 @@ def _unusable(
     return Rejection("station", name, os.path.commonpath(paths), None, (reason,))
 
 
-def _expected(found: SourceContents) -> set[str]:
-    """Return the stations of the metadata and list of a source, with records or without."""
-    listed = (row for row in found.rejected if row.kind == "station" and row.source == FDSN)
-    networks = found.inventory or ()
-    codes = {f"{network.code}.{place.code}" for network in networks for place in network}
-    # Names that can be those of files
-    usable = (name for name in found.stations if not code_problem(*name.split(".", 1)))
-    return codes.union(usable, (row.name for row in listed))
-
-
 def _station(
-    name: str,
-    paths: tuple[Path, ...],
-    inventory: Inventory | None,
-    reader: Reader,
-    hashes: dict[Path, str],
+    name: str, paths: tuple[Path, ...], source: RecordSource, hashes: dict[Path, str]
 ) -> StationSource:
     """Return a station with its metadata; each file is hashed once, for all of its stations."""
-    for path in paths:
-        if path not in hashes:
-            hashes[path] = hash_if_readable(path)
+    hashes |= {path: hash_if_readable(path) for path in paths if path not in hashes}
     network, station = name.split(".", 1)
-    metadata = inventory and inventory.select(network=network, station=station)
-    return StationSource(paths, tuple(hashes[path] for path in paths), metadata, reader)
+    metadata = source.inventory and source.inventory.select(network=network, station=station)
+    return StationSource(paths, tuple(hashes[path] for path in paths), metadata, source.reader)
 
 
-def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None:
+def _event_file(records: config.Records, fetched: Fetched | None) -> EventFile | None:
     """Return the event: that of the configuration, else the fetched one, else the workspace's."""
     if fetched and fetched.event:  # which is that of the configuration if there is one
         return fetched.event
@@ -227,31 +227,6 @@ def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None
     return read_event_file(workspace) if workspace and has_event(workspace) else None
 
 
-def _contents(
-    records: config.Records,
-    fetched: Fetched | None,
-    event: Event | None,
-    folder: OneEarthquake | None,
-) -> Iterator[tuple[SourceContents, Reader]]:
-    """Yield the contents of each source with the reader of its stations."""
-    for table in records.columns:
-        name = f"{table.network}.{table.station}"
-        yield SourceContents({name: (table.file,)}, None, ()), partial(read_table, table=table)
-    if folder:
-        yield from folder.contents
-    if records.sds:
-        start, end = window(records.sds, event)
-        days = find_sds_stations(records.sds.folder, start, end, records.stationxml)
-        yield days, partial(read_sds_station, start=start, end=end)
-    # Records processed by others and by services come last
-    if records.asdf:
-        workspace = find_asdf_stations(records.asdf.file, records.asdf.tag)
-        yield workspace, partial(read_asdf_station, tag=records.asdf.tag)
-    if fetched:
-        yield fetched_stations(fetched), partial(read_station)
-
-
 def read_table(*_: object, table: config.Columns) -> tuple[Stream, tuple[Rejection, ...]]:
     """Read a plain table of samples; file, metadata and name are in its description."""
-    description = table.model_dump()
-    return read_columns(description.pop("file"), **description), ()
+    return read_described(table), ()

@@ -2,17 +2,24 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from obspy import Trace
 
 from per_obspy.errors import Rejection
-from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
-from per_obspy.records.earthquakes.choice import peak_motion
-from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
-from per_obspy.records.folder import find_stations, read_station, trace_row
+from per_obspy.records.asdf import find_asdf_stations, is_asdf
+from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, peak_motion, record_span
+from per_obspy.records.folder import find_stations, trace_row
+
+#: Columns that are words of ``trace.stats``.
+_SAME_WORDS = (
+    "simulated",
+    "coordinates_source",
+    "coordinates_conflict",
+    "site_class",
+    "vs30",
+)
 
 
 class RecordInfo(NamedTuple):
@@ -106,13 +113,13 @@ def describe_records(
     """
     root = Path(path)
     if root.is_file() and is_asdf(root):
-        found, reader = find_asdf_stations(root, "*"), partial(read_asdf_station, tag="*")
+        found = find_asdf_stations(root, "*")
     else:
-        found, reader = find_stations(root, stationxml), partial(read_station)
+        found = find_stations(root, stationxml)
     # Station by station, so that one alone is in memory
-    records, spans, rejected = list[RecordInfo](), list[RecordSpan](), list(found.rejected)
+    records, spans, rejected = [], [], list(found.rejected)
     for name, paths in found.stations.items():
-        stream, unread = reader(paths, found.inventory, name)
+        stream, unread = found.reader(paths, found.inventory, name)
         rejected += unread
         rejected += [trace_row(one, "it has no samples") for one in stream if not one.stats.npts]
         for trace in (one for one in stream if one.stats.npts):
@@ -153,9 +160,5 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
         peak=peak,
         unit=unit,
         file=source.name if source == root else str(source.relative_to(root)),
-        simulated=stats.get("simulated", False),
-        coordinates_source=stats.get("coordinates_source", ""),
-        coordinates_conflict=stats.get("coordinates_conflict", ""),
-        site_class=stats.get("site_class", ""),
-        vs30=stats.get("vs30"),
+        **{name: stats[name] for name in _SAME_WORDS if name in stats},
     )

@@ -175,7 +175,7 @@ def read_quakeml(path: Path) -> tuple[dict[str, Event], list[str]]:
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     # One earthquake without a place costs no other
-    events, problems = dict[str, Event](), list[str]()
+    events, problems = {}, []
     for event in catalog:
         earthquake, problem = _plausible(event)
         if problem:

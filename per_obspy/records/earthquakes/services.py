@@ -160,28 +160,28 @@ def find_events(source: str, query: Mapping[str, str]) -> list[Earthquake]:
     path = Path(source)
     if path.is_file():
         select = _selection(source, query)
-        rows = list(filter(select, _rows_of_file(path)))
-    elif source.startswith(("http://", "https://")) and ".geojson" in source:
+        rows = _usable(source, partial(_file_rows, path), partial(CatalogError, source))
+    elif re.match(r"https?://.*\.geojson", source):
         select = _selection(public_url(source), query)
-        rows = list(filter(select, _rows_of_answer(source, _feed_rows, {})))
+        rows = _answered(source, _feed_rows, {})
     elif path.suffix.lower() in FILES and "://" not in source:
         raise CatalogError(source, "no such file")
+    # Everything else is the base URL or the name of an event service, which selects itself
     else:
-        # Everything else is the base URL or the name of an event service, which selects itself
-        rows = _rows_of_service(source, query)
-    return sorted(rows, key=lambda row: row.time, reverse=True)
+        times = {name: query[name] for name in query.keys() & {"starttime", "endtime"}}
+        select, url = _selection(public_url(source), times), _event_url(source)
+        rows = _answered(url, _text_rows, {**query, "format": "text"})
+        # A service may pass over a parameter that it does not know
+        if others := sum(not select(row) for row in rows):
+            log.warning("%s: %d earthquakes of another time left out", public_url(url), others)
+    return sorted(filter(select, rows), key=lambda row: row.time, reverse=True)
 
 
-def _rows_of_service(source: str, query: Mapping[str, str]) -> list[Earthquake]:
-    """Return the earthquakes that an event service lists of a query."""
-    times = {name: query[name] for name in ("starttime", "endtime") if name in query}
-    select, url = _selection(public_url(source), times), _event_url(source)
-    listed = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
-    rows = list(filter(select, listed))
-    # A service may pass over a parameter that it does not know
-    if others := len(listed) - len(rows):
-        log.warning("%s: %d earthquakes of another time left out", public_url(url), others)
-    return rows
+def _answered(
+    url: str, read: Callable[[bytes], Listed], query: Mapping[str, str]
+) -> list[Earthquake]:
+    """Return the earthquakes in the answer of a service or feed."""
+    return _usable(url, lambda: read(answer(WebPool(*_PATIENCE), url, query)))
 
 
 def listed_events(pool: WebPool, provider: str, query: Mapping[str, str]) -> Listed:
@@ -328,41 +328,32 @@ def event_content(pool: WebPool, provider: str, event_id: str) -> bytes:
         return b""
 
 
-def _rows_of_file(path: Path) -> list[Earthquake]:
-    """Return the earthquakes of a GeoJSON or QuakeML file."""
+def _file_rows(path: Path) -> Listed:
+    """Return the earthquakes of a GeoJSON or QuakeML file, which the first letter tells apart."""
     content = path.read_bytes()
-
-    def read() -> Listed:
-        # Both are told apart by the first letter
-        if content.lstrip()[:1] == b"{":
-            return _feed_rows(content)
-        events = read_with_obspy(obspy.read_events, path)
-        return _each(earthquake_of, events, lambda event: str(event.resource_id))
-
-    return _usable(str(path), read, partial(CatalogError, str(path)), "is no list of events")
-
-
-def _rows_of_answer(
-    url: str, rows: Callable[[bytes], Listed], query: Mapping[str, str]
-) -> list[Earthquake]:
-    """Return the earthquakes in the answer of a service or feed."""
-    content, shown = answer(WebPool(*_PATIENCE), url, query), public_url(url)
-    problem = f"{shown}: answers with data other than a list of events"
-    return _usable(shown, partial(rows, content), ServiceError, problem)
+    if content.lstrip()[:1] == b"{":
+        return _feed_rows(content)
+    events = read_with_obspy(obspy.read_events, path)
+    return _each(earthquake_of, events, lambda event: str(event.resource_id))
 
 
 def _usable(
-    source: str, read: Callable[[], Listed], fault: Callable[[str], PerError], problem: str
+    source: str, read: Callable[[], Listed], fault: Callable[[str], PerError] | None = None
 ) -> list[Earthquake]:
     """Return the earthquakes of a list; its problems are warnings, a fault if nothing else is."""
+    shown = public_url(source)
     try:
         rows, problems = read()
         if problems and not rows:
             raise ValueError(problems[0])
     except (ValueError, KeyError, TypeError) as error:
-        raise fault(f"{problem}: {_reason(error)}") from error
+        if fault:
+            raise fault(f"is no list of events: {_reason(error)}") from error
+        problem = "answers with data other than a list of events"
+        raise ServiceError(f"{shown}: {problem}: {_reason(error)}") from error
+    # One line that is wrong costs no other
     for warning in problems:
-        log.warning("%s: left out: %s", source, warning)
+        log.warning("%s: left out: %s", shown, warning)
     return rows
 
 
@@ -370,7 +361,7 @@ def _each(
     read: Callable[[Any], Earthquake], entries: Iterable[Any], name: Callable[[Any], str] = str
 ) -> Listed:
     """Read every entry of a list alone; a fact that cannot be true is a problem of its entry."""
-    rows, problems = list[Earthquake](), list[str]()
+    rows, problems = [], []
     for entry in entries:
         try:
             row = read(entry)

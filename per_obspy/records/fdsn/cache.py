@@ -41,7 +41,7 @@ from per_obspy.records.fdsn.request import (
     wanted_around,
 )
 from per_obspy.records.fdsn.web import WebPool
-from per_obspy.records.folder import SourceContents, find_stations
+from per_obspy.records.folder import RecordSource, find_stations
 from per_obspy.records.seedlink import server_address
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status, write_status
 
@@ -226,7 +226,7 @@ def has_cut_records(fetched: Fetched) -> bool:
     return any(ends_early(file, fetched.wanted.end) for file in files if not is_part(file))
 
 
-def fetched_stations(fetched: Fetched) -> SourceContents:
+def fetched_stations(fetched: Fetched) -> RecordSource:
     """
     Return the cached stations of a request, as ``records.folder.find_stations`` does.
 
@@ -241,17 +241,17 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
     rejected = (*fetched.rejected, *damaged, *left_out)
     # Metadata alone are no station
     if with_records <= broken:
-        return SourceContents({}, None, rejected)
+        return RecordSource({}, None, rejected)
     contents = find_stations(fetched.folder)
     others = _others(contents, fetched.wanted)
     usable = stations_inside(contents.inventory or Inventory(), fetched.wanted)
     usable -= broken | {row.name for row in others}
     files = {name: _whole_files(contents, name) for name in sorted(usable)}
     stations = {name: paths for name, paths in files.items() if paths}
-    return SourceContents(stations, contents.inventory, (*rejected, *others), contents.hashes)
+    return RecordSource(stations, contents.inventory, (*rejected, *others), contents.hashes)
 
 
-def _whole_files(contents: SourceContents, station: str) -> tuple[Path, ...]:
+def _whole_files(contents: RecordSource, station: str) -> tuple[Path, ...]:
     """Return the files of a station; half a file of a killed fetch has another stem."""
     return tuple(path for path in contents.stations.get(station, ()) if path.stem == station)
 
@@ -280,7 +280,7 @@ def _damage(records: Path, left_out: list[Rejection]) -> list[Rejection]:
     return [Rejection("station", records.stem, str(records), None, (reason,))]
 
 
-def _others(contents: SourceContents, wanted: Wanted) -> list[Rejection]:
+def _others(contents: RecordSource, wanted: Wanted) -> list[Rejection]:
     """Return a row per cached station whose file holds records of another request."""
     rows = dict[str, Rejection]()
     for record in contents.records:

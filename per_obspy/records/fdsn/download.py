@@ -137,14 +137,12 @@ class StationFiles:
         self, suffix: str, content: bytes, offer: Offer, left_out: Sequence[Rejection] = ()
     ) -> None:
         """Write a file, and then its hash into the status; the same content leaves no trace."""
-        path, new = self.path(suffix), bytes_hash(content)
-        before = self.status()
+        path, new, before = self.path(suffix), bytes_hash(content), self.status()
         if before["outputs"].get(path.name) == new == hash_if_readable(path):
             return
-        outputs = {name: known for name, known in before["outputs"].items() if name != path.name}
         with written_whole(path) as part:
             part.write_bytes(content)
-        outputs[path.name] = new
+        outputs = before["outputs"] | {path.name: new}
         # The word shard makes the status a description, which a folder of records passes over
         facts = {
             "shard": outputs.get(f"{self.station}{RECORDS}"),
@@ -235,7 +233,7 @@ def _records(
         # Real-time servers confuse channels and times as archives do
         return _all_asked(content, f"seedlink://{server}", files, str(server))
     url = f"{offer.base}/fdsnws/dataselect/1/query"
-    records, faults = Records(), list[ServiceError]()
+    records, fault = Records(), ServiceError()
     with suppress(RequestTooLarge):
         content = steady_answer(pool, url, files.parameters)
         records = _all_asked(content, url, files, host(url))
@@ -245,9 +243,9 @@ def _records(
             try:
                 records = _with_channel(pool, url, files, records, codes)
             except EmptyAnswer as error:
-                faults.append(error)
+                fault = error
     if not records.content:
-        raise faults[-1] if faults else NoData(f"{host(url)} has no data of the window")
+        raise fault if fault.args else NoData(f"{host(url)} has no data of the window")
     return records
 
 

@@ -96,17 +96,14 @@ def _origin(event: Event | None) -> Origin:
 
 def station_parameters(wanted: Wanted) -> dict[str, str]:
     """Return the parameters of a request for an FDSN station service."""
-    circle = {
-        "latitude": wanted.latitude,
-        "longitude": wanted.longitude,
-        "maxradius": wanted.radius,
+    return {
+        "latitude": f"{wanted.latitude:.6g}",
+        "longitude": f"{wanted.longitude:.6g}",
+        "maxradius": f"{wanted.radius:.6g}",
+        "network": ",".join(wanted.networks),
+        "station": ",".join(wanted.stations),
+        **channel_parameters(wanted),
     }
-    codes = {"network": wanted.networks, "station": wanted.stations}
-    return (
-        {name: f"{value:.6g}" for name, value in circle.items()}
-        | {name: ",".join(values) for name, values in codes.items()}
-        | channel_parameters(wanted)
-    )
 
 
 def channel_parameters(wanted: Wanted) -> dict[str, str]:

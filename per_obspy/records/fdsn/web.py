@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 from urllib.parse import unquote, urljoin, urlsplit, urlunsplit
 
 import urllib3
@@ -105,20 +104,9 @@ class WebPool:
         return urllib3.PoolManager(retries=False, timeout=self.timeout, maxsize=16, headers=agent)
 
 
-class Answer(NamedTuple):
-    """
-    An answer of a service.
-
-    Attributes
-    ----------
-    content : bytes
-        Empty if there are no data (204).
-    is_framed : bool
-        Whether the service announced where the answer ends, so that a cut would have been seen.
-    """
-
-    content: bytes
-    is_framed: bool
+#: Content of an answer, empty if there are no data (204), and whether the service announced where
+#: the answer ends, so that a cut would have been seen.
+Answer = tuple[bytes, bool]
 
 
 def answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> bytes:
@@ -136,20 +124,18 @@ def answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> bytes:
     ServiceError
         If there is no answer, it takes too long or is too large, or it is another fault.
     """
-    return _patient_answer(pool, url, parameters).content
+    return _patient_answer(pool, url, parameters)[0]
 
 
 def steady_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> bytes:
     """Return an answer whose end the service announced, or that is the same a second time."""
-    first = _patient_answer(pool, url, parameters)
+    before = None
     # Where no length is announced, a connection that breaks looks like the end
-    for _ in range(_COMPARISONS):
-        if first.is_framed:
-            return first.content
-        second = _patient_answer(pool, url, parameters)
-        if second.content == first.content:
-            return first.content
-        first = second
+    for _ in range(_COMPARISONS + 1):
+        content, is_framed = _patient_answer(pool, url, parameters)
+        if is_framed or content == before:
+            return content
+        before = content
     raise ServiceError(f"{public_url(url)}: its answers are cut at different places")
 
 
@@ -255,7 +241,7 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
     """Return the content of a response; its status may be an error."""
     # 204 is an answer, all else but 200 a fault
     if response.status == _NO_CONTENT:
-        return Answer(b"", is_framed=True)
+        return b"", True
     if response.status != 200:
         raise _refusal(response, shown)
     # Piece by piece, so that a slow or endless answer ends at the limits
@@ -270,7 +256,7 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
         reason = 'an empty answer (HTTP 200), which is not "no data" (HTTP 204)'
         raise EmptyAnswer(f"{shown}: {reason}: asked again later")
     is_framed = "Content-Length" in response.headers or "Transfer-Encoding" in response.headers
-    return Answer(bytes(content), is_framed)
+    return bytes(content), is_framed
 
 
 def _refusal(response: urllib3.BaseHTTPResponse, shown: str) -> ServiceError:

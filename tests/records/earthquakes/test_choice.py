@@ -12,9 +12,13 @@ from obspy.core.event import Event, Origin
 
 from per_obspy.config import Records, Scenario
 from per_obspy.errors import CatalogError
-from per_obspy.records.earthquakes.choice import largest_motion, one_earthquake, peak_motion
-from per_obspy.records.earthquakes.groups import event_groups
-from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.earthquakes.groups import (
+    event_groups,
+    largest_motion,
+    one_earthquake,
+    peak_motion,
+)
+from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import Sources, find_sources
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
@@ -74,7 +78,7 @@ def test_the_origin_time_of_the_event_chooses_its_records(both: Path):
     origin = Origin(time=UTCDateTime(AFTER), latitude=0.0, longitude=0.0)
     found = find_stations(both)
     chosen = one_earthquake(found, Records(folder=both), Event(origins=[origin]))
-    assert [group["screened"] for group in chosen.earthquakes] == [False, True]
+    assert [group["screened"] for group in chosen[1]] == [False, True]
 
 
 def test_a_file_that_holds_both_earthquakes_is_read_in_the_window_of_one(
@@ -102,7 +106,7 @@ def test_one_earthquake_is_read_as_before(both: Path):
 
 def test_the_largest_motion_is_the_peak_of_the_strongest_record(both: Path):
     found = find_stations(both)
-    motion = partial(largest_motion, found, partial(read_station))
+    motion = partial(largest_motion, found)
     after, main = sorted(map(motion, event_groups(found.records)))
     # magnitudes 5.0 and 6.5 at the same places
     assert 0.0 < after < main

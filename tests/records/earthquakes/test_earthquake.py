@@ -7,14 +7,13 @@ from format_samples import SAMPLES
 from obspy import UTCDateTime
 
 from per_obspy.config import Records
-from per_obspy.records.earthquakes.choice import group_event
 from per_obspy.records.earthquakes.earthquake import (
     Earthquake,
     agreed_event,
     header_event,
     same_earthquake,
 )
-from per_obspy.records.earthquakes.groups import event_groups
+from per_obspy.records.earthquakes.groups import event_groups, group_event
 from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import find_path_sources, find_sources
 
