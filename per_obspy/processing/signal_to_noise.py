@@ -24,18 +24,11 @@ MOST_STORED = 2**17 + 1
 
 
 class NoiseSpectra(NamedTuple):
-    """
-    Smoothed Fourier amplitudes of signal and noise.
+    """Smoothed Fourier amplitudes of signal and noise, (n_frequencies,)."""
 
-    Attributes
-    ----------
-    frequencies : (n_frequencies,) ndarray
-        Logarithmically spaced, Hz.
-    signal, noise : (n_frequencies,) ndarray
-        Amplitudes, m/s; the noise scaled to the length of the signal.
-    """
-
+    #: logarithmically spaced, Hz
     frequencies: FloatArray
+    #: amplitudes, m/s; the noise scaled to the length of the signal
     signal: FloatArray
     noise: FloatArray
 
@@ -44,6 +37,11 @@ class NoiseSpectra(NamedTuple):
         """Return signal to noise, dimensionless; infinite where there is no noise."""
         with np.errstate(divide="ignore"):
             return np.asarray(self.signal / self.noise)
+
+    def within(self, low: float, high: float) -> "NoiseSpectra":
+        """Return the spectra between two frequencies, Hz."""
+        inside = (self.frequencies >= low) & (self.frequencies <= high)
+        return NoiseSpectra(*(values[inside] for values in self))
 
 
 def noise_spectra(
@@ -97,38 +95,15 @@ def _centres(nyquist: float) -> FloatArray:
     return np.geomspace(LOWEST_FREQUENCY, nyquist, count)
 
 
-def within(spectra: NoiseSpectra, low: float, high: float) -> NoiseSpectra:
-    """Return the spectra between two frequencies, Hz."""
-    inside = (spectra.frequencies >= low) & (spectra.frequencies <= high)
-    return NoiseSpectra(*(values[inside] for values in spectra))
-
-
 def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] | None:
-    """
-    Return the widest band (in octaves) with signal to noise above the threshold.
-
-    Parameters
-    ----------
-    spectra : NoiseSpectra
-    threshold : float
-        Signal to noise, dimensionless.
-
-    Returns
-    -------
-    (low, high) or None
-        Hz; None if there is no such frequency.
-    """
+    """Return the widest band, Hz, whose signal to noise reaches a threshold; None without any."""
     starts, stops = runs(spectra.ratio >= threshold)
     if not starts.size:
         return None
+    # In octaves: the frequencies are logarithmically spaced
     widest = int((stops - starts).argmax())
     low, high = spectra.frequencies[[starts[widest], stops[widest] - 1]]
     return float(low), float(high)
-
-
-def weakest_ratio(spectra: NoiseSpectra, band: tuple[float, float]) -> float:
-    """Return the smallest signal to noise inside a band, Hz; dimensionless."""
-    return float(within(spectra, *band).ratio.min(initial=np.inf))
 
 
 def sustained_ratio(spectra: NoiseSpectra) -> float:
