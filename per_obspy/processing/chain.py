@@ -124,23 +124,11 @@ def process_station(
     """
     Process a station and return the best instrument with a row for each other trace.
 
-    Parameters
-    ----------
-    stream : iterable of obspy Trace
-        All channels of one station, unchanged by it. From :func:`.account.taken`, so that no other
-        code holds them, raw records leave memory on the way.
-    settings : Processing
-        Every number of the chain.
-    event : obspy Event or Source, optional
-        Its origin helps to find the first wave, its magnitude gives a corner without noise.
-
-    Returns
-    -------
-    best : obspy Stream
-        Empty if no horizontal is usable.
-    rejected : tuple of Rejection
-        One row per trace; a bad trace is rejected alone. Sensors in structures are among them: they
-        recorded the structure, not the ground; `process_instruments` processes them.
+    The channels are unchanged by it; from :func:`.account.taken`, so that no other code holds them,
+    raw records leave memory on the way. The event's origin helps to find the first wave, its
+    magnitude gives a corner without noise. The best instrument is empty if no horizontal is usable.
+    A bad trace is rejected alone. Sensors in structures are among the rejected: they recorded the
+    structure, not the ground; `process_instruments` processes them.
     """
     ground, structure = split_structures(stream)
     candidates, unusable = process_instruments(taken(ground), settings, event)
@@ -175,18 +163,8 @@ def process_instruments(
     Process every instrument of a station by itself, the preferred instrument first.
 
     For arrays in structures, boreholes and co-located sensors, whose instruments see different
-    motion.
-
-    Parameters
-    ----------
-    stream, settings, event
-        As in `process_station`.
-
-    Returns
-    -------
-    instruments : list of Stream
-        Without those that have no usable trace.
-    rejected : tuple of Rejection
+    motion. Arguments are those of `process_station`; instruments without a usable trace are left
+    out.
     """
     whole, broken = merged(stream)
     source = event if isinstance(event, Source) else None

@@ -155,19 +155,10 @@ def _between_1_and_20_hertz(samples: FloatArray, dt: float) -> FloatArray:
 
 def aic_onset(samples: FloatArray) -> int:
     r"""
-    Return the sample that best divides a record into two stationary parts.
+    Return the sample that best divides a record, up to its peak, into two stationary parts.
 
     .. math:: AIC(k) = k \log \sigma^2(x_1 \ldots x_k)
                        + (N - k - 1) \log \sigma^2(x_{k+1} \ldots x_N)
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Up to the peak.
-
-    Returns
-    -------
-    int
 
     References
     ----------
@@ -195,17 +186,7 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
     """
     Return the sample with the largest ratio of the energies in windows after and before it.
 
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Up to the peak.
-    window : int
-        Samples in each window.
-
-    Returns
-    -------
-    int or None
-        None if the record is shorter than two windows.
+    The record ends at its peak; None if it is shorter than two windows, samples.
 
     References
     ----------
@@ -228,16 +209,6 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
 def baer_onset(samples: FloatArray, dt: float) -> int | None:
     """
     Return the sample picked by the method of Baer & Kradolfer, or None.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    int or None
 
     References
     ----------

@@ -50,25 +50,11 @@ def noise_spectra(
     """
     Compute the smoothed spectra of the noise before the onset and of the shaking after it.
 
-    The signal lasts until 95 % of the squared acceleration after the onset. Noise is stationary, so
-    that its amplitude grows with the root of the window's length: it is scaled to the length of the
-    signal. Below one cycle in the noise window the noise is unknown: its lowest resolved amplitude
-    is carried on.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) ndarray
-        Without its baseline, m/s2.
-    dt : float
-        Sampling interval, s.
-    onset : float
-        End of the noise, s from the first sample; at least 2 dt.
-    bandwidth : float
-        Of the Konno-Ohmachi window, dimensionless.
-
-    Returns
-    -------
-    NoiseSpectra
+    The signal lasts until 95 % of the squared acceleration after the onset, which is at least 2 dt
+    from the first sample, s. Noise is stationary, so that its amplitude grows with the root of the
+    window's length: it is scaled to the length of the signal. Below one cycle in the noise window
+    the noise is unknown: its lowest resolved amplitude is carried on. The acceleration, m/s2, is
+    without its baseline; the bandwidth is that of the Konno-Ohmachi window, dimensionless.
     """
     # Noise before the onset, significant shaking after it
     noise, shaking = np.split(acceleration, [round(onset / dt)])
@@ -125,25 +111,9 @@ def konno_ohmachi(
 
     .. math:: w(f) = \left[ \frac{\sin(b \log_{10}(f/f_c))}{b \log_{10}(f/f_c)} \right]^4
 
-    Parameters
-    ----------
-    amplitudes : (..., n_frequencies) ndarray
-        At 0, step, 2 step, ...; any unit.
-    step : float
-        Between frequencies, Hz.
-    centres : tuple of float
-        Frequencies of the smoothed spectrum, Hz; hashable, because the weights are cached.
-    bandwidth : float
-        b, dimensionless.
-
-    Returns
-    -------
-    (..., n_centres) ndarray
-        In the unit of the amplitudes.
-
-    Notes
-    -----
-    Only the main lobe is used: the side lobes weigh at most 0.2 % of it.
+    Amplitudes, (..., n_frequencies), are at 0, step, 2 step ... Hz; the centres f_c, Hz, are a
+    tuple, because the weights are cached, and b is the bandwidth. Only the main lobe is used: the
+    side lobes weigh at most 0.2 % of it.
 
     References
     ----------

@@ -67,17 +67,9 @@ def thin_spectrum(
     Return the low frequencies of signals with zero pads: those of a grid with fewer points.
 
     A long record is transformed as the sum of its interleaved parts, each turned by its delay: at
-    the low frequencies alone that takes a tenth of the memory.
-
-    Parameters
-    ----------
-    signals : (..., n_samples) ndarray
-    dt : float
-        Sampling interval, s.
-    highpass, order
-        Of the filter to come, Hz, which decide the length of the pads; a corner of 0 needs none.
-    thin : int
-        Samples of the record for each point of the grid.
+    the low frequencies alone that takes a tenth of the memory. Corner and order of the filter to
+    come decide the length of the pads (a corner of 0 needs none); ``thin`` samples of the signals,
+    (..., n_samples), make one point of the grid.
 
     Returns
     -------

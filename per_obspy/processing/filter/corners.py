@@ -278,28 +278,13 @@ def displacement_drift(
     acceleration: FloatArray, dt: float, lowest: float, order: int
 ) -> Callable[[float], float]:
     r"""
-    Return the share of drift in a record's displacement as a function of the high-pass corner.
+    Return the share of drift in a record's displacement as a function of the high-pass corner, Hz.
 
     .. math:: d(f_{hp}) = \max_t |p_5(t)| / \max_t |u(t)|
 
     where u is the displacement of the filtered record, without its pads, and p5 the polynomial of
-    fifth order fitted to it.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) ndarray
-        Tapered, m/s2.
-    dt : float
-        Sampling interval, s.
-    lowest : float
-        Lowest corner to be tried, Hz: it decides the length of the pads.
-    order : int
-        Of the Butterworth filter.
-
-    Returns
-    -------
-    callable
-        From the corner, Hz, to the drift, dimensionless.
+    fifth order fitted to it. The acceleration, m/s2, is tapered; the lowest corner to be tried
+    decides the length of the pads.
 
     References
     ----------
