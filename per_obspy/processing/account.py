@@ -39,7 +39,10 @@ LEAST = {
 MOST = {
     "sampling_interval": "sampling interval, s (are its times in milliseconds?):",
     "channel_rate": "sampling rate off the {:g} Hz of StationXML by a share of",
-    "saturation": f"{CLIPPED}: samples within 5 % of an extreme over those 5 to 15 % below it:",
+    **dict.fromkeys(
+        ("saturation", "possible_saturation"),
+        f"{CLIPPED}: samples within 5 % of an extreme over those 5 to 15 % below it:",
+    ),
     "counter_use": "peak over the full scale of a 24-bit counter:",
     "dropout": "dropout, s without change:",
     "filled": "filled: {} samples on a straight line during the shaking, s:",
@@ -52,8 +55,14 @@ MOST = {
     "exchanged_component": (
         "exchanged with the vertical? ln share of early motion over that of the others:"
     ),
-    "unusual_acceleration": "peak acceleration, m/s2 (wrong unit?):",
-    "unusual_velocity": "peak velocity, m/s (wrong unit or sampling interval?):",
+    **dict.fromkeys(
+        ("unusual_acceleration", "impossible_acceleration"),
+        "peak acceleration, m/s2 (wrong unit?):",
+    ),
+    **dict.fromkeys(
+        ("unusual_velocity", "impossible_velocity"),
+        "peak velocity, m/s (wrong unit or sampling interval?):",
+    ),
     "velocity_time": "peak velocity over peak acceleration, s (wrong sampling interval?):",
     "late_trigger": "late trigger: first second over the peak:",
     "cut_off": "ends while shaking: last second over the peak:",
@@ -64,10 +73,12 @@ MOST = {
         "the baseline shifted during the shaking: velocity that stayed, over the peak velocity"
     ),
 }
-MOST |= {
-    "possible_saturation": MOST["saturation"],
-    "impossible_acceleration": MOST["unusual_acceleration"],
-    "impossible_velocity": MOST["unusual_velocity"],
+
+#: Check -> the milder one of the same figure, which counts where the first does not fail.
+MILDER = {
+    "saturation": "possible_saturation",
+    "impossible_acceleration": "unusual_acceleration",
+    "impossible_velocity": "unusual_velocity",
 }
 
 #: Flag -> the checks that raise it where they warn; others raise ``record_warning``.
@@ -110,20 +121,8 @@ def with_note(
     """
     Return the trace after a step: a copy with a line in ``stats.processing``.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        Before the step, which does not change it.
-    step : str
-        Short description.
-    data : (n_samples,) ndarray, optional
-        New samples.
-    **numbers : str, float or int
-        Choices for this record; stored in ``stats.per_obspy``.
-
-    Returns
-    -------
-    obspy Trace
+    It has new samples, if the step gives some, and the numbers that the step chose for this record
+    in ``stats.per_obspy``.
     """
     out = with_numbers(trace, **numbers)
     out.stats.setdefault("processing", []).append(f"per_obspy: {step}")
@@ -184,19 +183,8 @@ def survivors(
     """
     Apply a step to each trace by itself, so that a bad trace is rejected alone.
 
-    Parameters
-    ----------
-    step : callable
-        From trace to new trace; raises `RecordRejected`.
-    traces : iterable of obspy Trace
-        From `taken` where each may leave memory after its step.
-
-    Returns
-    -------
-    accepted : obspy Stream
-        Results of the step.
-    rejected : tuple of Rejection
-        One row for each other trace.
+    The step raises `RecordRejected`. The traces are from `taken` where each may leave memory after
+    its step.
     """
     accepted, rejected, remaining = Stream(), list[Rejection](), list(traces)
     while remaining:
@@ -213,21 +201,13 @@ def survivors(
 
 
 class Finding(NamedTuple):
-    """
-    A failed check.
+    """A failed check."""
 
-    Attributes
-    ----------
-    check : str
-        Name of the check in the configuration.
-    level : str
-        reject, warn or note.
-    reason : str
-        Contains the figure and the threshold.
-    """
-
+    #: name of the check in the configuration
     check: str
+    #: reject, warn or note
     level: str
+    #: with the figure and the threshold
     reason: str
 
 
@@ -240,25 +220,13 @@ class Findings(list[Finding]):
 
     def compare(self, check: str, figure: float, *words: object) -> bool:
         """
-        Compare a figure with the limit of its check.
+        Compare a figure with the limit of its check, and with that of a milder one.
 
-        Parameters
-        ----------
-        check : str
-            Key of `LEAST` or `MOST`.
-        figure : float
-            In the unit of the limit.
-        *words : object
-            What the text of the check names.
-
-        Returns
-        -------
-        bool
-            Whether the check failed.
+        The words are what the text of the check names. Return whether a check failed.
         """
         limit, is_least = getattr(self.checks, check).threshold, check in LEAST
         if figure >= limit if is_least else figure <= limit:
-            return False
+            return check in MILDER and self.compare(MILDER[check], figure, *words)
         # In the words of the check
         meaning = (LEAST[check] if is_least else MOST[check]).format(*words)
         bound = f", needs {limit:g}" if is_least else f", allowed {limit:g}"
@@ -280,21 +248,9 @@ def judge(trace: Trace, findings: Iterable[Finding]) -> Trace:
     """
     Return a trace with its warnings and notes, a copy if there are any.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-    findings : iterable of Finding
-
-    Returns
-    -------
-    obspy Trace
-        With ``warnings`` and ``notes`` in ``stats.per_obspy``: reasons joined by semicolons;
-        ``failed_checks`` has the names of the checks that warn, joined by spaces.
-
-    Raises
-    ------
-    RecordRejected
-        If a finding rejects, with the rejecting reasons first, then the warnings.
+    ``warnings`` and ``notes`` in ``stats.per_obspy`` have the reasons, joined by semicolons, and
+    ``failed_checks`` the names of the checks that warn, joined by spaces. A finding that rejects
+    raises `RecordRejected` with the rejecting reasons first, then the warnings.
     """
     reasons: dict[str, list[str]] = {"reject": [], "warn": [], "note": [], "failed": []}
     for check, level, reason in findings:
@@ -320,21 +276,13 @@ def judge(trace: Trace, findings: Iterable[Finding]) -> Trace:
 
 def with_flags(trace: Trace) -> Trace:
     """
-    Return a record with its flags, names separated by spaces; a copy if there are any.
+    Return a processed record with its flags, names separated by spaces; a copy if there are any.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        Processed, with ``failed_checks`` and the reasons of its corners in ``stats.per_obspy``.
-
-    Returns
-    -------
-    obspy Trace
-        ``stats.per_obspy.record_flags`` of a record may hold ``baseline_shift``,
-        ``second_event``, ``clipped``, ``wrapped``, ``filled``, ``implausible_record``,
-        ``assumed_corners``, ``record_warning`` (another check that warns), ``digitised``,
-        ``undated`` and ``contradicting_coordinates``; it is missing where there is none. The last
-        three are in ``warnings`` too. Flags of an earlier processing stay.
+    ``stats.per_obspy.record_flags`` may hold ``baseline_shift``, ``second_event``, ``clipped``,
+    ``wrapped``, ``filled``, ``implausible_record``, ``assumed_corners``, ``record_warning``
+    (another check that warns), ``digitised``, ``undated`` and ``contradicting_coordinates``; it is
+    missing where there is none. The last three are in ``warnings`` too. Flags of an earlier
+    processing stay.
     """
     flags = record_flags(trace)
     if not flags:
@@ -353,10 +301,8 @@ def record_flags(trace: Trace) -> list[str]:
     stats, account = trace.stats, trace.stats.get("per_obspy", {})
     # Flags of an earlier processing, and the checks that warn
     flags = set(account.get("record_flags", "").split())
-    flags |= {
-        FLAG_OF_CHECK.get(check, "record_warning")
-        for check in account.get("failed_checks", "").split()
-    }
+    failed = account.get("failed_checks", "").split()
+    flags |= {FLAG_OF_CHECK.get(check, "record_warning") for check in failed}
     # Corners that neither the noise nor a header gives, or that a shifted baseline asks for
     reasons = f"{account.get('highpass_source', '')}, {account.get('lowpass_source', '')}"
     if any(assumed in reasons for assumed in (SILENT_HEADER, FROM_TABLE, FROM_CONSTANT)):

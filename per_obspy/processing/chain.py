@@ -9,7 +9,6 @@ import logging
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from functools import partial
-from itertools import filterfalse
 
 from obspy import Stream, Trace
 from obspy.core import AttribDict
@@ -45,7 +44,6 @@ from per_obspy.processing.filter.corners import (
     LOWPASS_OF_NYQUIST,
     choose_corners,
     clean_corner,
-    keep_offset,
     lowest_highpass,
     share_corners,
     with_usable_periods,
@@ -58,8 +56,8 @@ from per_obspy.processing.motion_checks import (
     component_findings,
     final_findings,
 )
-from per_obspy.processing.noise_window import noise_windows, trim
-from per_obspy.processing.raw_checks import final_sample_findings, raw_findings
+from per_obspy.processing.noise_window import noise_windows
+from per_obspy.processing.raw_checks import raw_findings
 
 #: Settings of an empty configuration.
 DEFAULTS = Processing()
@@ -126,23 +124,11 @@ def process_station(
     """
     Process a station and return the best instrument with a row for each other trace.
 
-    Parameters
-    ----------
-    stream : iterable of obspy Trace
-        All channels of one station, unchanged by it. From :func:`.account.taken`, so that no other
-        code holds them, raw records leave memory on the way.
-    settings : Processing
-        Every number of the chain.
-    event : obspy Event or Source, optional
-        Its origin helps to find the first wave, its magnitude gives a corner without noise.
-
-    Returns
-    -------
-    best : obspy Stream
-        Empty if no horizontal is usable.
-    rejected : tuple of Rejection
-        One row per trace; a bad trace is rejected alone. Sensors in structures are among them: they
-        recorded the structure, not the ground; `process_instruments` processes them.
+    The channels are unchanged by it; from :func:`.account.taken`, so that no other code holds them,
+    raw records leave memory on the way. The event's origin helps to find the first wave, its
+    magnitude gives a corner without noise. The best instrument is empty if no horizontal is usable.
+    A bad trace is rejected alone. Sensors in structures are among the rejected: they recorded the
+    structure, not the ground; `process_instruments` processes them.
     """
     ground, structure = split_structures(stream)
     candidates, unusable = process_instruments(taken(ground), settings, event)
@@ -177,18 +163,8 @@ def process_instruments(
     Process every instrument of a station by itself, the preferred instrument first.
 
     For arrays in structures, boreholes and co-located sensors, whose instruments see different
-    motion.
-
-    Parameters
-    ----------
-    stream, settings, event
-        As in `process_station`.
-
-    Returns
-    -------
-    instruments : list of Stream
-        Without those that have no usable trace.
-    rejected : tuple of Rejection
+    motion. Arguments are those of `process_station`; instruments without a usable trace are left
+    out.
     """
     whole, broken = merged(stream)
     source = event if isinstance(event, Source) else None
@@ -213,39 +189,28 @@ def process_instrument(
     """
     Process the components of one instrument and return a row for each that is left out.
 
-    Every step is done for one component at a time, and each leaves memory when its next form is
-    there, if no other code holds it.
-
-    Parameters
-    ----------
-    instrument : iterable of obspy Trace
-        Whole, oriented traces, all raw or all processed by others.
-    settings : Processing
-        Every number of the chain.
-    source : Source or None
-        The event, if known.
-
-    Returns
-    -------
-    processed : obspy Stream
-    rejected : tuple of Rejection
+    The traces are whole and oriented, all raw or all processed by others. Every step is done for
+    one component at a time, and each leaves memory when its next form is there, if no other code
+    holds it.
     """
     components = Stream(list(instrument))
     is_final = bool(components) and is_processed(components[0])
     pair, unusable = _physical_pair(components, settings, is_final)
     if is_final:
-        passing = _judged_step(pair, settings, partial(pass_through, settings=settings))
-        passed, unfit = survivors(passing, taken(pair))
-        return passed, (*unusable, *unfit)
-    # All components around the shaking
-    for trace in taken(noise_windows(taken(pair), settings, source)):
-        pair += trim(trace, settings.longest_noise, settings.longest_signal)
-    # Baseline and corners of each component; the horizontals share the narrower band
-    step = _judged_step(pair, settings, _corner_step(pair, settings, source))
-    ready, undecided = survivors(step, taken(pair))
-    verticals = Stream(list(filterfalse(is_horizontal, ready)))
-    ready = share_corners(filter(is_horizontal, taken(ready))) + verticals
-    verticals.clear()
+        choose = partial(pass_through, settings=settings)
+    else:
+        # All components around the shaking, then baseline and corners of each
+        pair = noise_windows(taken(pair), settings, source)
+        fallback = _fallback(pair, settings, source)
+        choose = partial(choose_corners, settings=settings, fallback=fallback)
+    # Each component is judged by the others first
+    findings = component_findings(pair, settings.checks)
+    ready, undecided = survivors(
+        lambda trace: choose(judge(trace, findings.get(trace.id, ()))), taken(pair)
+    )
+    if is_final:
+        return ready, (*unusable, *undecided)
+    ready = share_corners(taken(ready))
     done, restless = survivors(partial(_filter, settings=settings), taken(ready))
     return done, (*unusable, *undecided, *restless)
 
@@ -274,21 +239,8 @@ def _physical_pair(
     return pair, (*unfit, *unpaired)
 
 
-def _judged_step(
-    pair: Stream, settings: Processing, step: Callable[[Trace], Trace]
-) -> Callable[[Trace], Trace]:
-    """Return a step that first judges each component by the others."""
-    findings = component_findings(pair, settings.checks)
-    return lambda trace: step(judge(trace, findings.get(trace.id, ())))
-
-
-def _corner_step(
-    pair: Stream, settings: Processing, source: Source | None
-) -> Callable[[Trace], Trace]:
-    """Return the step that chooses baseline and corners."""
-    # The permanent offset is kept on request only
-    if settings.permanent_offset:
-        return partial(keep_offset, settings=settings)
+def _fallback(pair: Stream, settings: Processing, source: Source | None) -> Callable[[], Corner]:
+    """Return the function that gives the high-pass corner of a record without noise."""
     # The first magnitude in the headers, where there is no event
     magnitudes = [trace.stats.get("event", {}).get("magnitude") for trace in pair]
     in_header = next((float(magnitude) for magnitude in magnitudes if magnitude), None)
@@ -300,13 +252,14 @@ def _corner_step(
             source.note(highpass=list(corner))
         return corner
 
-    return partial(choose_corners, settings=settings, fallback=fallback)
+    return fallback
 
 
 def _filter(trace: Trace, settings: Processing) -> Trace:
     """Return the filtered record with usable periods and flags, marked as processed."""
     chosen, order = trace.stats.per_obspy, settings.order
     corners = AttribDict(highpass=chosen.highpass, lowpass=chosen.lowpass)
+    # A permanent offset takes no high-pass, and its displacement stays
     if settings.permanent_offset:
         trace = bandpass(trace, 0.0, corners.lowpass, order)
     else:
@@ -314,11 +267,9 @@ def _filter(trace: Trace, settings: Processing) -> Trace:
         trace = bandpass(padded, corners.highpass, corners.lowpass, order)
         del padded
     trace = with_usable_periods(trace, settings.usable)
-    findings = [
-        finding
-        for finding in final_findings(trace, settings.checks)
-        if not (settings.permanent_offset and finding.check == "final_displacement")
-    ]
+    findings = final_findings(trace, settings.checks)
+    if settings.permanent_offset:
+        findings = [one for one in findings if one.check != "final_displacement"]
     # A second pass keeps a processed record with its corners
     trace = copy_header(judge(trace, findings))
     trace.stats.processing_level, trace.stats.corners = "processed", corners
@@ -327,37 +278,19 @@ def _filter(trace: Trace, settings: Processing) -> Trace:
 
 def pass_through(trace: Trace, settings: Processing) -> Trace:
     """
-    Return a copy of a record processed by others, with its corners and usable periods.
+    Return a copy of a record processed by others, m/s2, with its corners and usable periods.
 
     Without a high-pass corner in the header, the corner that would clean the displacement limits
     the usable periods (no filter is applied); without a low-pass corner, 0.75 of the Nyquist
     frequency. Velocity or displacement that does not come to rest, and a peak that is not the
     header's, are warnings: the samples are final. What no ground motion can be is rejected as in
     raw records.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Acceleration, m/s2.
-    settings : Processing
-        Every number of the chain.
-
-    Returns
-    -------
-    obspy Trace
-
-    Raises
-    ------
-    RecordRejected
-        If a check rejects, with every reason.
     """
-    header = trace.stats.get("corners", {})
-    if header.get("highpass"):
-        highpass = Corner(header["highpass"], "header")
-    else:
+    header, nyquist = trace.stats.get("corners", {}), trace.stats.sampling_rate / 2
+    highpass = Corner(header.get("highpass"), "header")
+    if not highpass.frequency:
         highpass = _limiting_highpass(trace, settings)
     # Corners like 999 Hz mean none
-    nyquist = trace.stats.sampling_rate / 2
     lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, f"0.75 Nyquist, {SILENT_HEADER}")
     if 0 < header.get("lowpass", 0) < nyquist:
         lowpass = Corner(header["lowpass"], "header")
@@ -369,8 +302,8 @@ def pass_through(trace: Trace, settings: Processing) -> Trace:
         lowpass=float(lowpass.frequency),
         lowpass_source=lowpass.reason,
     )
-    findings = final_sample_findings(trace, settings.checks)
     # Their corners are no choice of this program
+    findings = raw_findings(trace, settings.checks, is_final=True)
     findings += final_findings(trace, lenient(settings.checks, AT_REST))
     return with_flags(with_usable_periods(judge(out, findings), settings.usable))
 
@@ -378,10 +311,8 @@ def pass_through(trace: Trace, settings: Processing) -> Trace:
 def _limiting_highpass(trace: Trace, settings: Processing) -> Corner:
     """Return the corner below which the displacement is not clean, as a limit of usable periods."""
     highest = settings.highpass_range[1]
-    shape = taper(trace, settings.taper)
-    clean = clean_corner(shape, lowest_highpass(trace), highest, settings)
-    if clean is None:
-        return Corner(highest, f"displacement drifts at any corner, {SILENT_HEADER}")
+    clean = clean_corner(taper(trace, settings.taper), lowest_highpass(trace), highest, settings)
+    clean = clean or Corner(highest, "displacement drifts at any corner")
     return Corner(clean.frequency, f"{clean.reason}, {SILENT_HEADER}")
 
 
@@ -389,21 +320,8 @@ def before_processing(stream: Stream, processed: Trace, settings: Processing) ->
     """
     Return the raw record of a processed trace in m/s2 over the processed time.
 
-    Only the mean of its noise is removed.
-
-    Parameters
-    ----------
-    stream : obspy Stream
-        All channels of the station as read.
-    processed : obspy Trace
-        From `process_station`.
-    settings : Processing
-        Settings of that processing.
-
-    Returns
-    -------
-    obspy Trace or None
-        None if the record came processed by others.
+    The stream is that of the station as read, the settings are those of its processing. Only the
+    mean of the noise is removed. None if the record came processed by others.
     """
     whole, _ = merged(
         trace for trace in stream if trace.id == processed.id and not is_processed(trace)
@@ -413,8 +331,9 @@ def before_processing(stream: Stream, processed: Trace, settings: Processing) ->
     physical = in_acceleration(whole[0], settings.gain_tolerance)
     # Start of the processed record without its pads, s and samples after that of the raw one
     chosen, dt = processed.stats.per_obspy, processed.stats.delta
-    before = round(float(chosen.get("pad_before", 0.0)) / dt)
-    after = round(float(chosen.get("pad_after", 0.0)) / dt)
+    before, after = (
+        round(float(chosen.get(f"pad_{side}", 0.0)) / dt) for side in ("before", "after")
+    )
     start = processed.stats.starttime + before * dt - physical.stats.starttime
     first = max(round(start / physical.stats.delta), 0)
     # The samples between the pads

@@ -47,18 +47,9 @@ AZIMUTH_CODE = re.compile(r"[0-3]?\d\d")
 
 def in_structure(trace: Trace) -> bool:
     """
-    Return whether the header puts the sensor into a structure.
+    Return whether the header puts the sensor, by its ``sensor_location``, into a structure.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        With ``sensor_location`` if the header has the place of the sensor (CSMIP, COSMOS). The
-        station's name does not count: a free-field sensor near a bridge has the bridge's name.
-
-    Returns
-    -------
-    bool
-        False if the header has no place or one in the free field.
+    The station's name does not count: a free-field sensor near a bridge has the bridge's name.
 
     Examples
     --------
@@ -71,17 +62,7 @@ def in_structure(trace: Trace) -> bool:
 
 
 def split_structures(stream: Iterable[Trace]) -> tuple[Stream, Stream]:
-    """
-    Separate the traces of a station that recorded the ground from those in a structure.
-
-    Parameters
-    ----------
-    stream : iterable of obspy Trace
-
-    Returns
-    -------
-    ground, structure : obspy Stream
-    """
+    """Separate the traces of a station that recorded the ground from those in a structure."""
     ground, structure = Stream(), Stream()
     for trace in stream:
         place = structure if in_structure(trace) else ground
@@ -141,21 +122,11 @@ def direction_of(channel: str) -> str:
 
 def tell_apart(instrument: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Return the components of an instrument whose directions can be told apart.
+    Return the components of an instrument whose directions can be told apart, not yet oriented.
 
     Components that share an identity are refused. Without a vertical among them, so are those
     whose header, metadata and code are no direction: each may be the vertical. Of 1, 2 and 3, or
     U, V and W, none is known without metadata. A single component counts as horizontal.
-
-    Parameters
-    ----------
-    instrument : obspy Stream
-        Traces of one instrument, one for each component, not yet oriented.
-
-    Returns
-    -------
-    components : obspy Stream
-    rejected : tuple of Rejection
     """
     # Words of the header where it has any, else of the channel
     words = list(map(_word, instrument))
@@ -239,22 +210,9 @@ def paired(instrument: Iterable[Trace], overlap: float) -> tuple[Stream, tuple[R
     Return at most two horizontals of an instrument over their common time, and one vertical.
 
     The samples of the two horizontals share their times; clocks that differ by less than a sample
-    are set to the later one, by ``stats.per_obspy.clock_shift``. The vertical stays as it is.
-
-    Parameters
-    ----------
-    instrument : iterable of obspy Trace
-        Oriented traces of one instrument.
-    overlap : float
-        Smallest part of the longer horizontal that both must cover, dimensionless; else the shorter
-        one is rejected.
-
-    Returns
-    -------
-    components : obspy Stream
-    rejected : tuple of Rejection
-        Components parallel to another, with another sampling or a wrong one, too short for their
-        partner, or one too many.
+    are set to the later one, by ``stats.per_obspy.clock_shift``. The vertical stays as it is. Both
+    horizontals must cover a share of the longer one, ``overlap``. Rejected are components parallel
+    to another, with another sampling or a wrong one, too short for their partner, or one too many.
     """
     components = list(instrument)
     sampled, wrong = survivors(partial(_require_rate, instrument=components), components)
@@ -282,17 +240,7 @@ def at_one_interval(components: Iterable[Trace]) -> Stream:
 
     Every component of a film is digitised separately, so that mean intervals differ by some parts
     in a hundred thousand, or more where operators chose the points. Those with a longer interval
-    are interpolated linearly; all else stays as it is.
-
-    Parameters
-    ----------
-    components : iterable of obspy Trace
-        Components of one instrument; film has ``stats.digitised``.
-
-    Returns
-    -------
-    obspy Stream
-        In the same order; a trace that was interpolated is a copy with a note.
+    are interpolated linearly, with a note; all else stays as it is.
 
     Examples
     --------

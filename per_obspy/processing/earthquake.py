@@ -38,29 +38,18 @@ DIRECTIONS = ("vertical", "horizontal")
 
 
 class Source(NamedTuple):
-    """
-    Origin and magnitude of an event.
+    """Origin and magnitude of an event."""
 
-    Attributes
-    ----------
-    time : UTCDateTime
-        Of the origin.
-    latitude, longitude : float
-        Degrees.
-    depth : float
-        m.
-    magnitude : float or None
-        The preferred one, or the first.
-    decisions : list of dict or None
-        Collects every decision of the processing that depends on the event, with its causes, as
-        plain values: see `same_decisions`.
-    """
-
+    #: of the origin
     time: UTCDateTime
+    #: degrees
     latitude: float
     longitude: float
+    #: m
     depth: float
+    #: the preferred one, or the first
     magnitude: float | None
+    #: every decision of the processing that depends on the event, with its causes, as plain values
     decisions: list[dict[str, Any]] | None = None
 
     def note(self, **decision: object) -> None:
@@ -125,17 +114,10 @@ def first_wave(
     """
     Return the time of the first wave, None if there is no clear one, and the method.
 
-    Parameters
-    ----------
-    picked : callable
-        Returns the picks of the traces of a direction, one of `DIRECTIONS`.
-    computed : UTCDateTime or None
-        P wave by the travel time; rounded, so that a negligible change of origin changes nothing.
-    tolerance : float
-        Between a pick and the computed P, s.
-    end : UTCDateTime
-        Of the record. A P wave after it contradicts every pick: the station is in a wrong place, or
-        its clock is wrong, and the picks count.
+    ``picked`` returns the picks of the traces of a direction, one of `DIRECTIONS`. The computed P
+    wave is rounded, so that a negligible change of origin changes nothing; picks farther from it
+    than the tolerance, s, do not count. A P wave after the end of the record contradicts every
+    pick: the station is in a wrong place, or its clock is wrong, and the picks count.
     """
     if computed is not None:
         computed = UTCDateTime(round(computed.timestamp, P_DIGITS))
@@ -156,20 +138,9 @@ def fallback_highpass(
     magnitude: float | None, by_magnitude: dict[float, float], unknown: float
 ) -> Corner:
     """
-    Return the high-pass corner of a record without measurable noise.
+    Return the high-pass corner, Hz, of a record without measurable noise.
 
-    Parameters
-    ----------
-    magnitude : float or None
-        Of the event.
-    by_magnitude : dict
-        Smallest magnitude -> corner, Hz.
-    unknown : float
-        Corner without a magnitude, Hz.
-
-    Returns
-    -------
-    Corner
+    It is that of the largest magnitude of the table that is reached, or the unknown one.
 
     Examples
     --------
@@ -192,19 +163,9 @@ def same_decisions(
     """
     Return whether an earthquake leads to the decisions of an earlier processing.
 
-    Parameters
-    ----------
-    decisions : iterable of mapping
-        Collected by a `Source`, perhaps read from a file.
-    source : Source
-        The earthquake now.
-    settings : Processing
-        Those of the earlier processing.
-
-    Returns
-    -------
-    bool
-        False as well if a decision is damaged, or would depend on traces that were not picked.
+    The decisions were collected by a `Source` and perhaps read from a file; the settings are those
+    of that processing. False as well if a decision is damaged, or would depend on traces that were
+    not picked.
     """
     try:
         return all(_is_same(decision, source, settings) for decision in decisions)

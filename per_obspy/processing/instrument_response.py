@@ -58,22 +58,8 @@ def as_recorded(trace: Trace) -> Trace:
 
     ObsPy removes responses and sensitivities and multiplies by ``calib``, and leaves all of them in
     the header. ``stats.processing`` names the step; where that is lost, as in a file, the peak of
-    the header decides, or the factor that makes the samples whole numbers of counts.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Raw or not, with ``units`` or without.
-
-    Returns
-    -------
-    obspy Trace
-        The same, or a copy with another unit and without the response.
-
-    Raises
-    ------
-    RecordRejected
-        If the samples are no counts, and their unit is unknown.
+    the header decides, or the factor that makes the samples whole numbers of counts. A copy with
+    another unit has no response. Samples of an unknown unit that are no counts are rejected.
     """
     unit, reason = unit_after_steps(trace.stats), "steps of ObsPy"
     if unit is not None and unit.startswith("unknown"):
@@ -191,22 +177,8 @@ def in_acceleration(trace: Trace, gain_tolerance: float) -> Trace:
     level, which would distort accelerometers; the pre-filter does not change accelerometers at low
     frequency, where their response is flat. Without stages the overall sensitivity divides; without
     any response the factor ``calib`` multiplies, if the reader gives ``quantity = "acceleration"``.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-    gain_tolerance : float
-        Largest relative difference between the product of the stage gains and the overall
-        sensitivity.
-
-    Returns
-    -------
-    obspy Trace
-
-    Raises
-    ------
-    RecordRejected
-        Unknown units, no response, or a response that contradicts itself.
+    Rejected are unknown units, and a response whose product of stage gains is farther from the
+    overall sensitivity than a relative tolerance.
 
     References
     ----------

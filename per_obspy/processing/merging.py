@@ -38,21 +38,9 @@ LARGEST_SHIFT = 20.0
 
 def merged(stream: Iterable[Trace]) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Join the pieces of each channel.
+    Join the pieces of each channel to one new float64 trace; reject those that cannot be joined.
 
     Gaps, masked samples and samples that are not finite are reasons for rejection, never zeros.
-
-    Parameters
-    ----------
-    stream : iterable of obspy Trace
-        Any number of pieces of any number of channels.
-
-    Returns
-    -------
-    whole : obspy Stream
-        One new float64 trace per channel.
-    rejected : tuple of Rejection
-        The channels that cannot be joined.
     """
     pieces: dict[tuple[str, bool, str, str], list[Trace]] = defaultdict(list)
     for trace in stream:
@@ -206,16 +194,7 @@ def splice(pieces: Sequence[Trace]) -> Trace | None:
     Recorders that wrote a long record to several files gave each the whole second of its
     clock, off by seconds. The overlap with the highest concordance (Lin 1989, Biometrics 45) is
     used: copies of another size or mean do not agree. Inside it one piece fades into the other.
-
-    Parameters
-    ----------
-    pieces : sequence of obspy Trace
-        Of one channel, with equal sampling.
-
-    Returns
-    -------
-    obspy Trace or None
-        From the start of the first piece on; None if no overlap agrees.
+    None if no overlap of the pieces, which share a channel and its sampling, agrees.
     """
     whole, *others = sorted(pieces, key=lambda piece: piece.stats.starttime)
     for piece in others:
@@ -251,18 +230,8 @@ def best_overlap(
     """
     Return the number of samples by which the end of one piece best overlaps the next one.
 
-    Parameters
-    ----------
-    first, second : (n_samples,) ndarray
-        Samples in the same unit.
-    shortest, longest : int
-        Range of trial overlaps, samples.
-
-    Returns
-    -------
-    (count, concordance)
-        Samples, and the coefficient of concordance, dimensionless; (0, 0.0) if the pieces are too
-        short.
+    Trial overlaps run from the shortest to the longest. With the coefficient of concordance,
+    dimensionless; (0, 0.0) if the pieces are too short.
     """
     counts = range(shortest, min(longest, first.size, second.size) + 1)
     matches = [(_concordance(first[-count:], second[:count]), count) for count in counts]

@@ -8,7 +8,8 @@ each fault (``workflows/damaged_records.py``).
 """
 
 from collections import defaultdict
-from itertools import combinations, permutations
+from collections.abc import Mapping
+from itertools import permutations
 
 import numpy as np
 from obspy import Stream, Trace
@@ -17,7 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
-from per_obspy.processing.account import Finding, Findings, with_note
+from per_obspy.processing.account import Finding, Findings
 from per_obspy.processing.components import align, is_horizontal
 from per_obspy.processing.series import is_long, running_rms, without_line
 
@@ -41,31 +42,23 @@ EARLY = 0.05
 #: Checks of whether the motion comes to rest: only warnings where others have processed a record.
 AT_REST = ("final_velocity", "final_displacement", "baseline_shift")
 
-#: Quantity -> its integral and the unit of that.
-INTEGRALS = {"acceleration": ("velocity", "m/s"), "velocity": ("displacement", "m")}
-
 
 def acceleration_findings(trace: Trace, checks: Checks) -> Findings:
-    """
-    Return a finding if the peak of a record is beyond the largest one recorded, or below feeling.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Acceleration, m/s2, raw or processed; its mean does not count.
-    checks : Checks
-        Thresholds and levels.
-
-    Returns
-    -------
-    Findings
-    """
-    findings = Findings(checks)
-    peak = float(np.abs(trace.data - trace.data.mean()).max())
-    if not findings.compare("impossible_acceleration", peak):
-        findings.compare("unusual_acceleration", peak)
+    """Return findings if the peak of a record, m/s2, is beyond any recorded, or below feeling."""
+    findings, peak = Findings(checks), _peak(trace)
+    findings.compare("impossible_acceleration", peak)
     findings.compare("weak_motion", peak)
     return findings
+
+
+def _peak(trace: Trace) -> float:
+    """Return the peak of a record, m/s2; its mean does not count."""
+    return float(np.abs(trace.data - trace.data.mean()).max())
+
+
+def _ratio(figure: float, reference: float, without: float = 0.0) -> float:
+    """Return a figure over its reference, or another number where that is 0."""
+    return figure / reference if reference else without
 
 
 # Components of an instrument
@@ -73,22 +66,12 @@ def acceleration_findings(trace: Trace, checks: Checks) -> Findings:
 
 def component_findings(stream: Stream, checks: Checks) -> dict[str, Findings]:
     """
-    Return the findings of components that cannot have recorded the motion of the others.
+    Return the findings of components, m/s2, that cannot have recorded the motion of the others.
 
-    Parameters
-    ----------
-    stream : obspy Stream
-        Components of one instrument, m/s2.
-    checks : Checks
-        Thresholds and levels.
-
-    Returns
-    -------
-    dict
-        Trace identifier to findings, where there are any.
+    Identifiers of the traces of one instrument -> findings, where there are any.
     """
     findings: dict[str, Findings] = defaultdict(lambda: Findings(checks))
-    peaks = {trace.id: float(np.abs(trace.data - trace.data.mean()).max()) for trace in stream}
+    peaks = {trace.id: _peak(trace) for trace in stream}
     horizontals = [trace.id for trace in stream if is_horizontal(trace)]
     _find_outlier(peaks, findings)
     if len(horizontals) == 2:
@@ -106,13 +89,12 @@ def component_findings(stream: Stream, checks: Checks) -> dict[str, Findings]:
 def _find_copies(motions: dict[str, FloatArray], findings: dict[str, Findings]) -> bool:
     """Find two components that have equal samples but for a factor; return whether there are."""
     is_copy = False
-    for one, other in combinations(motions, 2):
-        first, second = motions[one], motions[other]
-        size = np.sqrt(np.sum(first**2) * np.sum(second**2))
-        correlation = float(abs(np.sum(first * second)) / size)
+    for name, partner in permutations(motions, 2):
+        product = np.sum(motions[name] * motions[partner])
+        size = np.sqrt(np.sum(motions[name] ** 2) * np.sum(motions[partner] ** 2))
         # Either of them may be the copy
-        for name, partner in permutations((one, other)):
-            is_copy |= findings[name].compare("copied_component", correlation, partner)
+        correlation = float(abs(product) / size)
+        is_copy |= findings[name].compare("copied_component", correlation, partner)
     return is_copy
 
 
@@ -121,7 +103,7 @@ def _find_outlier(peaks: dict[str, float], findings: dict[str, Findings]) -> Non
     # Of two none can be called wrong
     if len(peaks) > 2:
         largest, second = sorted(peaks, key=peaks.__getitem__, reverse=True)[:2]
-        ratio = peaks[largest] / peaks[second] if peaks[second] else np.inf
+        ratio = _ratio(peaks[largest], peaks[second], np.inf)
         findings[largest].compare("outlier", ratio, second)
 
 
@@ -139,7 +121,7 @@ def _find_weak(
         reference, factor, times = strong, 1.0, ""
         if name not in horizontals:
             reference, factor, times = weak, WEAKER_VERTICAL, f" and {WEAKER_VERTICAL:g}"
-        ratio = peaks[reference] / peak / factor if peak else np.inf
+        ratio = _ratio(peaks[reference], peak, np.inf) / factor
         is_weak = findings[name].compare("weak_component", ratio, reference, f"its own{times}")
         # Without a vertical either of them may be wrong
         if is_weak and not has_three:
@@ -224,86 +206,33 @@ def _compare_early_motion(
 # The processed record
 
 
-def integrate(trace: Trace) -> Trace:
-    """
-    Return a copy integrated once by the trapezoidal rule, from rest at the first sample.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Acceleration, m/s2, or velocity, m/s; with the pads of its filter, where it has any.
-
-    Returns
-    -------
-    obspy Trace
-        Velocity, m/s, or displacement, m.
-    """
-    quantity, units = INTEGRALS[trace.stats.get("quantity", "acceleration")]
-    integral = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)
-    out = with_note(trace, f"integrated to {quantity}", integral)
-    out.stats.quantity, out.stats.units = quantity, units
-    return out
-
-
 def final_findings(trace: Trace, checks: Checks) -> Findings:
     """
     Return findings of a velocity that no ground has, and of motion that does not come to rest.
 
-    Velocity and displacement come to rest with the pads. A residual velocity before the filter is
-    a finding too.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Processed acceleration, m/s2.
-    checks : Checks
-        Thresholds and levels.
-
-    Returns
-    -------
-    Findings
+    The trace is processed acceleration, m/s2. Velocity and displacement come to rest with the pads;
+    a residual velocity before the filter is a finding too.
     """
-    findings = Findings(checks)
-    velocity = integrate(trace)
-    peak_velocity = float(np.abs(velocity.data).max())
-    check_velocity(trace, peak_velocity, findings)
-    # Last value over the largest
-    motions = {"final_velocity": velocity.data, "final_displacement": integrate(velocity).data}
-    for name, motion in motions.items():
-        peak = np.abs(motion).max()
-        findings.compare(name, float(abs(motion[-1]) / peak) if peak else 0.0)
-    # Residual velocity before the filter
-    account = trace.stats.get("per_obspy", {})
-    residual = float(account.get("residual_velocity", 0.0))
-    is_shifted = findings.compare(
-        "baseline_shift", residual / peak_velocity if peak_velocity else 0.0
-    )
-    # A smaller one shortens the usable periods
-    certain = float(account.get("certain_period", np.inf))
-    if not is_shifted and certain <= float(account.get("longest_period", 0.0)):
-        reason = (
-            f"the baseline may have shifted during the shaking: PER beyond {certain:.3g} s depends "
-            "on when"
-        )
-        findings.append(Finding("baseline_shift", "warn", reason))
+    findings, dt = Findings(checks), trace.stats.delta
+    velocity = cumulative_trapezoid(trace.data, dx=dt, initial=0)
+    peak = float(np.abs(velocity).max())
+    findings.compare("impossible_velocity", peak)
+    # A sampling interval that is too long enlarges the velocity, not the acceleration
+    findings.compare("velocity_time", _ratio(peak, float(np.abs(trace.data).max())))
+    findings.compare("final_velocity", _ratio(float(abs(velocity[-1])), peak))
+    displacement = cumulative_trapezoid(velocity, dx=dt, initial=0)
+    farthest = float(np.abs(displacement).max())
+    findings.compare("final_displacement", _ratio(float(abs(displacement[-1])), farthest))
+    _find_shift(trace.stats.get("per_obspy", {}), peak, findings)
     return findings
 
 
-def check_velocity(trace: Trace, velocity: float, findings: Findings) -> None:
-    """
-    Compare a peak velocity, m/s, with the largest one recorded and with the peak acceleration.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Processed acceleration, m/s2.
-    velocity : float
-        Peak velocity, m/s.
-    findings : Findings
-        Gets what fails.
-    """
-    if not findings.compare("impossible_velocity", velocity):
-        findings.compare("unusual_velocity", velocity)
-    # A sampling interval that is too long enlarges the velocity, not the acceleration
-    peak = float(np.abs(trace.data).max())
-    findings.compare("velocity_time", velocity / peak if peak else 0.0)
+def _find_shift(account: Mapping[str, float], peak: float, findings: Findings) -> None:
+    """Find a residual velocity before the filter, by the numbers of a record and a peak, m/s."""
+    residual, certain = account.get("residual_velocity", 0.0), account.get("certain_period", np.inf)
+    is_shifted = findings.compare("baseline_shift", _ratio(residual, peak))
+    # A smaller one shortens the usable periods
+    if not is_shifted and certain <= account.get("longest_period", 0.0):
+        reason = "the baseline may have shifted during the shaking: PER beyond"
+        reason = f"{reason} {certain:.3g} s depends on when"
+        findings.append(Finding("baseline_shift", "warn", reason))

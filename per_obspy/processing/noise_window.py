@@ -35,24 +35,12 @@ def noise_windows(
 
     The pick is that of the vertical, on which P is largest, or else the median of the horizontals.
     With a known event a pick farther from the computed P than the tolerance is discarded, and the
-    computed P is used if no pick is left.
+    computed P is used if no pick is left. Without a clear wave there is no noise, and none where it
+    is shorter than ``shortest_noise``; ``pre_event`` of the settings is the noise without a pick.
+    Samples far from the first wave are cut: the hours of a continuous record.
 
-    Parameters
-    ----------
-    instrument : iterable of obspy Trace
-        Its components, raw or physical, not padded.
-    settings : Processing
-        ``pre_event`` is the noise at the beginning, if known: no wave is picked. Else the noise
-        ends ``onset_margin`` before the first wave; noise shorter than ``shortest_noise`` counts as
-        none.
-    source : Source or None
-        The event, if known.
-
-    Returns
-    -------
-    obspy Stream
-        With ``noise`` (s from the first sample, 0 for none), ``onset_source`` and, where there is
-        one, ``onset`` (UTC) in ``stats.per_obspy``.
+    ``stats.per_obspy`` gets ``noise`` (s from the first sample, 0 for none), ``onset_source`` and,
+    where there is one, ``onset`` (UTC).
     """
     traces, given = list(instrument), settings.pre_event
     if given is not None:
@@ -69,7 +57,8 @@ def noise_windows(
             quiet, when = float(end - trace.stats.starttime), {"onset": str(onset)}
             noise = quiet if quiet >= settings.shortest_noise else 0.0
         step = f"noise: first {noise:.2f} s ({method})"
-        out += with_note(trace, step, noise=noise, onset_source=method, **when)
+        noted = with_note(trace, step, noise=noise, onset_source=method, **when)
+        out += _trim(noted, onset, settings) if onset is not None else noted
     return out
 
 
@@ -108,53 +97,27 @@ def _picked_times(traces: list[Trace], is_horizontal: bool) -> list[UTCDateTime]
     return times
 
 
-def trim(trace: Trace, before: float, after: float) -> Trace:
-    """
-    Return a trace without the samples far from the first wave: the hours of a continuous record.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        From `noise_windows`; one without an onset stays whole.
-    before, after : float
-        Time kept before and after the first wave, s.
-
-    Returns
-    -------
-    obspy Trace
-        A copy where samples were cut.
-    """
-    start, end, account = trace.stats.starttime, trace.stats.endtime, trace.stats.per_obspy
-    onset = UTCDateTime(account.get("onset", start))
-    is_longer = start < onset - before or end > onset + after
-    is_inside = onset - before < end and onset + after > start
-    if "onset" not in account or not is_longer or not is_inside:
+def _trim(trace: Trace, onset: UTCDateTime, settings: Processing) -> Trace:
+    """Return a trace with ``noise`` without the samples far from the first wave, if any are."""
+    start, end = trace.stats.starttime, trace.stats.endtime
+    first, last = onset - settings.longest_noise, onset + settings.longest_signal
+    if (first <= start and end <= last) or end <= first or last <= start:
         return trace
     part = copy_header(trace)
-    part.trim(onset - before, onset + after)
+    part.trim(first, last)
     # The noise is shorter by the time that was cut before it
     cut = part.stats.starttime - start
     step = f"{cut:.2f} s cut before and {end - part.stats.endtime:.2f} s after"
-    noise = max(float(account.noise) - cut, 0.0)
+    noise = max(float(trace.stats.per_obspy.noise) - cut, 0.0)
     return with_note(part, step, part.data.copy(), noise=noise)  # a view would hold the whole day
 
 
 def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | None:
     """
-    Pick the first wave of a record as the median of three pickers.
+    Pick the first wave of a record, in any unit, as the median of three pickers.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        Not padded; any unit.
-    clearest : float
-        Smallest ratio of the root mean squares 2 s after and before the pick, dimensionless.
-
-    Returns
-    -------
-    (onset, spread) or None
-        Seconds from the first sample, and between the earliest and the latest picker; None if no
-        wave is clear.
+    Return seconds from the first sample, and between the earliest and the latest picker; None if
+    no wave is clear: the root mean squares 2 s after and before it have at least some ratio.
     """
     dt = trace.stats.delta
     samples = _between_1_and_20_hertz(trace.data, dt)
@@ -192,19 +155,10 @@ def _between_1_and_20_hertz(samples: FloatArray, dt: float) -> FloatArray:
 
 def aic_onset(samples: FloatArray) -> int:
     r"""
-    Return the sample that best divides a record into two stationary parts.
+    Return the sample that best divides a record, up to its peak, into two stationary parts.
 
     .. math:: AIC(k) = k \log \sigma^2(x_1 \ldots x_k)
                        + (N - k - 1) \log \sigma^2(x_{k+1} \ldots x_N)
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Up to the peak.
-
-    Returns
-    -------
-    int
 
     References
     ----------
@@ -232,17 +186,7 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
     """
     Return the sample with the largest ratio of the energies in windows after and before it.
 
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Up to the peak.
-    window : int
-        Samples in each window.
-
-    Returns
-    -------
-    int or None
-        None if the record is shorter than two windows.
+    The record ends at its peak; None if it is shorter than two windows, samples.
 
     References
     ----------
@@ -265,16 +209,6 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
 def baer_onset(samples: FloatArray, dt: float) -> int | None:
     """
     Return the sample picked by the method of Baer & Kradolfer, or None.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    int or None
 
     References
     ----------

@@ -75,51 +75,42 @@ OTHER_RUNS = 4
 WARNINGS_OF_FINAL_SAMPLES = ("sampling_rate", "channel_rate", "duration", "spike", "header_peak")
 
 
-def raw_findings(trace: Trace, checks: Checks) -> Findings:
+def raw_findings(trace: Trace, checks: Checks, is_final: bool = False) -> Findings:
     """
-    Return every failed check of one raw trace.
+    Return every failed check of one raw trace, counts or m/s2.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        Counts or m/s2, before any step.
-    checks : Checks
-        Thresholds and levels.
-
-    Returns
-    -------
-    Findings
+    Of a record that others have processed, which is final, rate, duration, spikes and the header's
+    peak are warnings, and start and other events are those that its processing has chosen.
     """
-    findings = Findings(checks)
-    if _is_record(trace, findings):
-        # The recorder, then the motion and its ends
-        level, dt = without_line(trace.data), trace.stats.delta
-        _check_recorder(trace, level, findings)
+    findings = Findings(lenient(checks, WARNINGS_OF_FINAL_SAMPLES) if is_final else checks)
+    if not _is_record(trace, findings):
+        return findings
+    # The recorder, then the motion
+    level = without_line(trace.data)
+    _check_recorder(trace, level, findings)
+    _check_motion(level, trace.stats.delta, findings, is_final)
+    # Largest sample, with the mean and without: some headers give the peak before it was removed
+    if peak := trace.stats.get("header_peak"):
+        sizes = np.abs(trace.data).max(), np.abs(trace.data - trace.data.mean()).max()
+        findings.compare("header_peak", min(abs(float(one) / peak - 1) for one in sizes), peak)
+    return findings
+
+
+def _check_motion(level: FloatArray, dt: float, findings: Findings, is_final: bool) -> None:
+    """Check a record without trend for what the motion is, at its ends and in between."""
+    # Sizes of the first and the last second over the peak
+    second = max(round(1 / dt), 1)
+    starts, ends = (
+        float(np.sqrt(np.mean(part**2)) / np.abs(level).max())
+        for part in (level[:second], level[-second:])
+    )
+    if not is_final:
         rate = np.count_nonzero(np.diff(np.signbit(level))) / (level.size * dt)
         findings.compare("zero_crossings", rate)
-        findings.compare("late_trigger", _share_of_second(level, level[: _second(dt)]))
-        findings.compare("cut_off", _share_of_second(level, level[-_second(dt) :]))
+        findings.compare("late_trigger", starts)
+    findings.compare("cut_off", ends)
+    if not is_final:
         findings.compare("second_event", later_event(level, dt))
-        _check_header(trace, findings)
-    return findings
-
-
-def final_sample_findings(trace: Trace, checks: Checks) -> Findings:
-    """
-    Return the failed checks of the samples of a record that others have processed.
-
-    As :func:`raw_findings`, but that rate, duration, spikes and the header's peak are warnings, and
-    that start and other events are those that its processing has chosen.
-    """
-    findings = Findings(lenient(checks, WARNINGS_OF_FINAL_SAMPLES))
-    if _is_record(trace, findings):
-        # What the processing may have left, and what no processing mends
-        level = without_line(trace.data)
-        _check_recorder(trace, level, findings)
-        _check_header(trace, findings)
-        last = level[-_second(trace.stats.delta) :]
-        findings.compare("cut_off", _share_of_second(level, last))
-    return findings
 
 
 def _is_record(trace: Trace, findings: Findings) -> bool:
@@ -141,13 +132,18 @@ def _is_record(trace: Trace, findings: Findings) -> bool:
 
 def _check_recorder(trace: Trace, level: FloatArray, findings: Findings) -> None:
     """Check samples, as they are and without trend, for limits, overflow, fills and spikes."""
-    samples, dt = trace.data, trace.stats.delta
-    _check_limits(samples, findings)
-    # Physical units have no full scale
+    samples, dt, checks = trace.data, trace.stats.delta, findings.checks
+    run, pinned = longest_extreme_run(samples), pinned_samples(samples)
+    if run >= checks.clipped_run.threshold:
+        findings.add("clipped_run", f"clipped: {run} equal samples at an extreme")
+    elif pinned >= checks.pinned.threshold:
+        findings.add("pinned", f"{CLIPPED}: {pinned} samples are equal to an extreme")
+    # Below full scale, with noise on top; physical units have no full scale
+    findings.compare("saturation", piled_samples(samples))
     if trace.stats.get("units", "counts") == "counts":
         findings.compare("counter_use", float(np.abs(samples).max()) / FULL_SCALE)
     roughness = overflow_roughness(samples)
-    if roughness < findings.checks.wrapped.threshold:
+    if roughness < checks.wrapped.threshold:
         reason = f"wrapped: an overflow turned back leaves {roughness:.2g} of the steps around it"
         findings.add("wrapped", reason)
     # Missing samples: none, zeros, or a line between the last and the next
@@ -157,55 +153,12 @@ def _check_recorder(trace: Trace, level: FloatArray, findings: Findings) -> None
     findings.compare("spike", largest_spike(level, dt))
 
 
-def _check_limits(samples: FloatArray, findings: Findings) -> None:
-    """Check whether recorder or sensor reached the limit of its range."""
-    checks = findings.checks
-    run, pinned = longest_extreme_run(samples), pinned_samples(samples)
-    if run >= checks.clipped_run.threshold:
-        findings.add("clipped_run", f"clipped: {run} equal samples at an extreme")
-    elif pinned >= checks.pinned.threshold:
-        findings.add("pinned", f"{CLIPPED}: {pinned} samples are equal to an extreme")
-    # Below full scale, with noise on top
-    pile = piled_samples(samples)
-    if not findings.compare("saturation", pile):
-        findings.compare("possible_saturation", pile)
-
-
-def _second(dt: float) -> int:
-    """Return the number of samples in a second."""
-    return max(round(1 / dt), 1)
-
-
-def _share_of_second(level: FloatArray, second: FloatArray) -> float:
-    """Return the root mean square of a second over the peak of a record without trend."""
-    return float(np.sqrt(np.mean(second**2)) / np.abs(level).max())
-
-
-def _check_header(trace: Trace, findings: Findings) -> None:
-    """Compare the largest sample, with or without the mean, with the peak of the header, if any."""
-    header_peak = trace.stats.get("header_peak")
-    if header_peak:
-        # Some headers give the peak before the mean was removed
-        peaks = np.abs(trace.data).max(), np.abs(trace.data - trace.data.mean()).max()
-        error = min(abs(float(peak) / header_peak - 1) for peak in peaks)
-        findings.compare("header_peak", error, header_peak)
-
-
 def longest_extreme_run(samples: FloatArray) -> int:
     """
     Return the longest run of equal samples at the largest or the smallest value.
 
     A clipped signal has such runs. Coarse recorders repeat values at every turn of the motion: a
     run that is not twice the longest one between the extremes counts as 1.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Raw: removing a trend hides the extremes.
-
-    Returns
-    -------
-    int
 
     Examples
     --------
@@ -242,15 +195,6 @@ def pinned_samples(samples: FloatArray) -> int:
     1 if another value beyond half of that extreme is repeated a third as often: coarse recorders
     repeat all of them.
 
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Raw.
-
-    Returns
-    -------
-    int
-
     Examples
     --------
     >>> pinned_samples(np.array([0.0, 3.0, 2.0, 3.0, 0.0, -1.0, -2.0, 3.0]))
@@ -272,17 +216,8 @@ def piled_samples(samples: FloatArray) -> float:
 
     Ground motion seldom comes close to its peak. A sensor that saturates, or a recorder that clips
     before noise is added, has plateaus of unequal samples there: within 5 % of the extreme there
-    are more samples than 5 to 15 % below it.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Raw.
-
-    Returns
-    -------
-    float
-        The larger one of both extremes, dimensionless; 0 without two flat excursions.
+    are more samples than 5 to 15 % below it. The larger one of both extremes counts; 0 without two
+    flat excursions.
 
     References
     ----------
@@ -313,18 +248,9 @@ def overflow_roughness(samples: FloatArray) -> float:
     Return how rough a record stays where steps across its range are turned back.
 
     A counter that overflows continues at its other end. Adding its range to what follows leaves a
-    smooth motion there; steps of ground motion become as large in the other direction.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Raw.
-
-    Returns
-    -------
-    float
-        Root mean square of the jumps around these steps, after over before; infinite with fewer
-        than two such steps.
+    smooth motion there; steps of ground motion become as large in the other direction. It is the
+    root mean square of the jumps around these steps, after over before; infinite with fewer than
+    two such steps.
     """
     middle, full = np.median(samples), np.ptp(samples)
     steps = np.flatnonzero(np.abs(np.diff(samples)) > OVERFLOW_STEP * full)
@@ -347,19 +273,6 @@ def longest_gaps(samples: FloatArray, dt: float) -> tuple[float, int]:
     ground moves if the root mean square over 2 s exceeds a fifth of its largest value at both ends:
     the samples of coarse recorders may be constant before and after. Coarse recorders and film have
     many lines: a line that is not four times an ordinary one counts as 0.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Raw.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    seconds : float
-    count : int
-        With both ends of the line.
     """
     envelope = running_rms(samples - np.median(samples), STANDSTILL_ENVELOPE, dt, "reflect")
     is_moving = envelope > MOVING * envelope.max()
@@ -395,18 +308,7 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
 
     Others are those within half a second, without the two neighbours on each side. The jump of a
     sample is its distance from the mean of its two neighbours. Jumps below 5 % of the record's peak
-    do not count.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    float
-        Dimensionless; near 1 for ground motion.
+    do not count. Near 1 for ground motion.
     """
     peak = np.abs(samples).max()
     jumps = _jumps(samples)
@@ -435,22 +337,10 @@ def _jumps(samples: FloatArray) -> FloatArray:
 
 def later_event(samples: FloatArray, dt: float) -> float:
     """
-    Return the peak of another event over the peak of the record.
+    Return the peak of another event over the peak of the record, both of a running size.
 
     Another event comes after the record has become quiet, or ends before it was quiet. Quiet is a
     running root mean square over 5 s below 5 % of its largest value.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Without trend.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    float
-        Of the running root mean square, dimensionless.
     """
     envelope = running_rms(samples, ENVELOPE, dt, "constant")
     # First quiet sample after the main event, last one before it

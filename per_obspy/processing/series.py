@@ -41,21 +41,10 @@ def filter_blocks(
     running: Callable[[FloatArray], FloatArray], values: FloatArray, margin: int
 ) -> FloatArray:
     """
-    Return the output of a running filter, block by block.
+    Return the output of a running filter, block by block: SciPy's filters hold three copies.
 
-    SciPy's filters hold three copies of a series.
-
-    Parameters
-    ----------
-    running : callable
-        From values to as many values.
-    values : (n_values,) ndarray
-    margin : int
-        Neighbours on each side on which a value of the filter depends, at most.
-
-    Returns
-    -------
-    (n_values,) ndarray
+    The filter gives as many values as it gets, each of which depends on at most ``margin``
+    neighbours on each side.
     """
     out = np.empty(values.size)
     for block in blocks(0, values.size):

@@ -24,18 +24,11 @@ MOST_STORED = 2**17 + 1
 
 
 class NoiseSpectra(NamedTuple):
-    """
-    Smoothed Fourier amplitudes of signal and noise.
+    """Smoothed Fourier amplitudes of signal and noise, (n_frequencies,)."""
 
-    Attributes
-    ----------
-    frequencies : (n_frequencies,) ndarray
-        Logarithmically spaced, Hz.
-    signal, noise : (n_frequencies,) ndarray
-        Amplitudes, m/s; the noise scaled to the length of the signal.
-    """
-
+    #: logarithmically spaced, Hz
     frequencies: FloatArray
+    #: amplitudes, m/s; the noise scaled to the length of the signal
     signal: FloatArray
     noise: FloatArray
 
@@ -45,6 +38,11 @@ class NoiseSpectra(NamedTuple):
         with np.errstate(divide="ignore"):
             return np.asarray(self.signal / self.noise)
 
+    def within(self, low: float, high: float) -> "NoiseSpectra":
+        """Return the spectra between two frequencies, Hz."""
+        inside = (self.frequencies >= low) & (self.frequencies <= high)
+        return NoiseSpectra(*(values[inside] for values in self))
+
 
 def noise_spectra(
     acceleration: FloatArray, dt: float, onset: float, bandwidth: float
@@ -52,25 +50,11 @@ def noise_spectra(
     """
     Compute the smoothed spectra of the noise before the onset and of the shaking after it.
 
-    The signal lasts until 95 % of the squared acceleration after the onset. Noise is stationary, so
-    that its amplitude grows with the root of the window's length: it is scaled to the length of the
-    signal. Below one cycle in the noise window the noise is unknown: its lowest resolved amplitude
-    is carried on.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) ndarray
-        Without its baseline, m/s2.
-    dt : float
-        Sampling interval, s.
-    onset : float
-        End of the noise, s from the first sample; at least 2 dt.
-    bandwidth : float
-        Of the Konno-Ohmachi window, dimensionless.
-
-    Returns
-    -------
-    NoiseSpectra
+    The signal lasts until 95 % of the squared acceleration after the onset, which is at least 2 dt
+    from the first sample, s. Noise is stationary, so that its amplitude grows with the root of the
+    window's length: it is scaled to the length of the signal. Below one cycle in the noise window
+    the noise is unknown: its lowest resolved amplitude is carried on. The acceleration, m/s2, is
+    without its baseline; the bandwidth is that of the Konno-Ohmachi window, dimensionless.
     """
     # Noise before the onset, significant shaking after it
     noise, shaking = np.split(acceleration, [round(onset / dt)])
@@ -97,38 +81,15 @@ def _centres(nyquist: float) -> FloatArray:
     return np.geomspace(LOWEST_FREQUENCY, nyquist, count)
 
 
-def within(spectra: NoiseSpectra, low: float, high: float) -> NoiseSpectra:
-    """Return the spectra between two frequencies, Hz."""
-    inside = (spectra.frequencies >= low) & (spectra.frequencies <= high)
-    return NoiseSpectra(*(values[inside] for values in spectra))
-
-
 def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] | None:
-    """
-    Return the widest band (in octaves) with signal to noise above the threshold.
-
-    Parameters
-    ----------
-    spectra : NoiseSpectra
-    threshold : float
-        Signal to noise, dimensionless.
-
-    Returns
-    -------
-    (low, high) or None
-        Hz; None if there is no such frequency.
-    """
+    """Return the widest band, Hz, whose signal to noise reaches a threshold; None without any."""
     starts, stops = runs(spectra.ratio >= threshold)
     if not starts.size:
         return None
+    # In octaves: the frequencies are logarithmically spaced
     widest = int((stops - starts).argmax())
     low, high = spectra.frequencies[[starts[widest], stops[widest] - 1]]
     return float(low), float(high)
-
-
-def weakest_ratio(spectra: NoiseSpectra, band: tuple[float, float]) -> float:
-    """Return the smallest signal to noise inside a band, Hz; dimensionless."""
-    return float(within(spectra, *band).ratio.min(initial=np.inf))
 
 
 def sustained_ratio(spectra: NoiseSpectra) -> float:
@@ -150,25 +111,9 @@ def konno_ohmachi(
 
     .. math:: w(f) = \left[ \frac{\sin(b \log_{10}(f/f_c))}{b \log_{10}(f/f_c)} \right]^4
 
-    Parameters
-    ----------
-    amplitudes : (..., n_frequencies) ndarray
-        At 0, step, 2 step, ...; any unit.
-    step : float
-        Between frequencies, Hz.
-    centres : tuple of float
-        Frequencies of the smoothed spectrum, Hz; hashable, because the weights are cached.
-    bandwidth : float
-        b, dimensionless.
-
-    Returns
-    -------
-    (..., n_centres) ndarray
-        In the unit of the amplitudes.
-
-    Notes
-    -----
-    Only the main lobe is used: the side lobes weigh at most 0.2 % of it.
+    Amplitudes, (..., n_frequencies), are at 0, step, 2 step ... Hz; the centres f_c, Hz, are a
+    tuple, because the weights are cached, and b is the bandwidth. Only the main lobe is used: the
+    side lobes weigh at most 0.2 % of it.
 
     References
     ----------

@@ -1,5 +1,6 @@
 """Response spectra by azimuth: the two components superpose before the maximum is taken."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -167,7 +168,7 @@ def _spectra(
     components = two_components(north, east)
     dt = checks.number("dt", dt, checks.positive)
     (periods, dampings), shape = grid_of(periods, damping)
-    half_turn = _row_of_azimuths(azimuths) % 180.0
+    half_turn = row_of("azimuths", azimuths, checks.finite) % 180.0
 
     # The kernels take azimuths of a half turn in ascending order
     ascending = np.argsort(half_turn)
@@ -181,16 +182,10 @@ def _spectra(
         chosen = np.flatnonzero(parts == count)
         oscillators = prepare_oscillators(dt / count, periods[chosen], dampings[chosen])
         record = _record_with_steps_cut(components, count)
-        found = _lengths(record, oscillators, fan, shares, exact)
         # Back to the order of the arguments
-        lengths[:, chosen] = np.take(found, places, axis=2)
+        ordered = _lengths(record, oscillators, fan, shares, exact)
+        lengths[:, chosen] = ordered[..., places]
     return [spectrum.reshape(*shape, half_turn.size) for spectrum in lengths]
-
-
-def _row_of_azimuths(azimuths: ArrayLike) -> FloatArray:
-    """Check azimuths and return them as one row, degrees."""
-    row = np.atleast_1d(checks.numbers("azimuths", azimuths))
-    return row_of("azimuths", checks.finite("azimuths", row))
 
 
 def _lengths(
@@ -215,19 +210,13 @@ def _parts(phases: FloatArray, exact: bool) -> NDArray[np.int64]:
     return np.asarray(2 ** np.minimum(doublings, MOST_DOUBLINGS), dtype=np.int64)
 
 
-def _record_with_steps_cut(components: tuple[FloatArray, FloatArray], count: int) -> TiledRecord:
-    """Return both components with so many samples per step, ready for the kernels."""
-    return tiled_record(*(_with_steps_cut(component, count) for component in components))
-
-
-def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:
-    """Return more samples on the same straight lines, the closing ramp included."""
-    if count == 1:
-        return acceleration
-    closed = np.append(acceleration, 0.0)
-    steps = np.arange(count * acceleration.size + 1) / count
-    cut: FloatArray = np.interp(steps, np.arange(closed.size), closed)
-    return cut
+def _record_with_steps_cut(components: Sequence[FloatArray], count: int) -> TiledRecord:
+    """Return a record with more samples on the same straight lines, the closing ramp included."""
+    if count > 1:
+        whole = np.arange(components[0].size + 1)
+        steps = np.arange(count * components[0].size + 1) / count
+        components = [np.interp(steps, whole, np.append(one, 0.0)) for one in components]
+    return tiled_record(*components)
 
 
 def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:

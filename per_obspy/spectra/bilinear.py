@@ -210,8 +210,7 @@ def _arguments(
 ) -> tuple[FloatArray, float, FloatArray, float, float]:
     """Return record, interval, omegas in rad/s, damping and hardening."""
     record = checks.record("acceleration", acceleration)
-    row = np.atleast_1d(checks.numbers("periods", periods))
-    omegas = 2.0 * np.pi / row_of("periods", checks.positive("periods", row))
+    omegas = 2.0 * np.pi / row_of("periods", periods)
     ratio = checks.number("damping", damping, checks.fraction_of_critical)
     dt = checks.number("dt", dt, checks.positive)
     return record, dt, omegas, ratio, _hardening(hardening)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -114,42 +113,6 @@ def stretches(record: TiledRecord) -> Iterator[TiledRecord]:
         peaks = record.peaks[:, first:last].copy()
         jumps = record.jumps[:, first:last].copy()
         yield TiledRecord(record.north[samples], record.east[samples], peaks, jumps, record.scale)
-
-
-def select_tiles(
-    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
-) -> NDArray[np.int64]:
-    """
-    Raise the largest values to the samples of a stretch and select tiles for the search between.
-
-    Returns
-    -------
-    selected : (n, 2) ndarray of int
-        Tile and lane wherever the bounds allow a larger value between the samples.
-    """
-    tiles = stretch.peaks.shape[1]
-    selected = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.choose_tiles(
-        tile_states, stretch.peaks, stretch.jumps, *block[:3], block.size, largest, selected
-    )
-    return selected[:count]
-
-
-def raise_between_samples(
-    stretch: TiledRecord,
-    block: Oscillators,
-    tile_states: FloatArray,
-    states: FloatArray,
-    selected: NDArray[np.int64],
-    largest: FloatArray,
-) -> None:
-    """Raise the largest values by the motion between the samples of tiles, from their states."""
-    blocks.search_tiles(*stretch[:4], *block[:3], tile_states, states, selected, largest)
-
-
-def raise_to_samples(stretch: TiledRecord, tile_states: FloatArray, largest: FloatArray) -> None:
-    """Raise the largest values to those at the samples of a stretch."""
-    blocks.raise_to_tiles(tile_states, stretch.peaks.shape[1], largest)
 
 
 def over_blocks(
@@ -261,8 +224,7 @@ def per_spectrum(
     >>> per_spectrum([9.81] * 400, 0.005, [1.0], damping=0.0).round(6)
     array([0.49698])
     """
-    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    return _radii(tiled_record(record), prepare_oscillators(dt, *grid), exact=True).reshape(shape)
+    return _radii(acceleration, dt, periods, damping)
 
 
 @takes_trace
@@ -300,9 +262,7 @@ def response_spectra(
     >>> spectra.sa.round(6)
     array([19.62])
     """
-    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    oscillators = prepare_oscillators(dt, *grid)
-    return _spectra(_responses(tiled_record(record), oscillators, exact=True), oscillators, shape)
+    return _responses(acceleration, dt, periods, damping)
 
 
 def sampled_per_spectrum(
@@ -313,8 +273,7 @@ def sampled_per_spectrum(
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    return _radii(tiled_record(record), prepare_oscillators(dt, *grid), exact=False).reshape(shape)
+    return _radii(acceleration, dt, periods, damping, exact=False)
 
 
 def sampled_response_spectra(
@@ -325,24 +284,24 @@ def sampled_response_spectra(
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    oscillators = prepare_oscillators(dt, *grid)
-    return _spectra(_responses(tiled_record(record), oscillators, exact=False), oscillators, shape)
+    return _responses(acceleration, dt, periods, damping, exact=False)
 
 
 def _arguments(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike
-) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray], tuple[int, ...]]:
-    """Return record, dt, the grid as paired periods and dampings, and the shape of the result."""
+) -> tuple[TiledRecord, Oscillators, tuple[int, ...]]:
+    """Return the checked record, the oscillators of the grid, and the shape of the result."""
     record = checks.record("acceleration", acceleration)
-    return record, checks.number("dt", dt, checks.positive), *grid_of(periods, damping)
+    dt = checks.number("dt", dt, checks.positive)
+    grid, shape = grid_of(periods, damping)
+    return tiled_record(record), prepare_oscillators(dt, *grid), shape
 
 
 def grid_of(
     periods: ArrayLike, damping: ArrayLike
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[int, ...]]:
     """Return every damping with every period as paired rows, and the shape of the grid."""
-    row = row_of("periods", checks.positive("periods", _at_least_a_row("periods", periods)))
+    row = row_of("periods", periods)
     # A single damping leaves the result one-dimensional
     dampings = checks.fraction_of_critical("damping", damping)
     if dampings.ndim > 1 or dampings.size == 0:
@@ -351,11 +310,6 @@ def grid_of(
         )
     grid = np.tile(row, dampings.size), np.repeat(dampings, row.size)
     return grid, (*dampings.shape, row.size)
-
-
-def _at_least_a_row(name: str, values: ArrayLike) -> FloatArray:
-    """Return numbers as an array, a single one as one row."""
-    return np.atleast_1d(checks.numbers(name, values))
 
 
 def two_components(north: ArrayLike, east: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -369,23 +323,31 @@ def two_components(north: ArrayLike, east: ArrayLike) -> tuple[FloatArray, Float
     return components
 
 
-def row_of(name: str, values: FloatArray) -> FloatArray:
-    """Return one row of at least one value."""
-    if values.ndim != 1 or values.size == 0:
-        raise ValueError(
-            f"{name} must be one row of at least one value, got the shape {values.shape}"
-        )
-    return values
+def row_of(
+    name: str,
+    values: ArrayLike,
+    check: Callable[[str, ArrayLike], FloatArray] = checks.positive,
+) -> FloatArray:
+    """Return one row of at least one value that passes a check; a single number is one row."""
+    row = np.atleast_1d(check(name, values))
+    if row.ndim != 1 or row.size == 0:
+        raise ValueError(f"{name} must be one row of at least one value, got the shape {row.shape}")
+    return row
 
 
 def _raise_between_samples(
     stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
 ) -> None:
     """Raise the largest values to those of a stretch, between the samples too."""
-    # Only the tiles whose bounds allow a larger value are run again
-    selected = select_tiles(stretch, block, tile_states, largest)
+    *samples, peaks, jumps, _ = stretch
+    selected = np.empty((peaks.shape[1] * blocks.LANES, 2), dtype=np.int64)
+    count = blocks.choose_tiles(
+        tile_states, peaks, jumps, *block[:3], block.size, largest, selected
+    )
+    # Only the tiles and lanes whose bounds allow a larger value are run again
+    selected = selected[:count]
     states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
-    raise_between_samples(stretch, block, tile_states, states, selected, largest)
+    blocks.search_tiles(*samples, peaks, jumps, *block[:3], tile_states, states, selected, largest)
 
 
 def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
@@ -419,29 +381,29 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
         if exact:
             _raise_between_samples(stretch, block, tile_states, largest)
         else:
-            raise_to_samples(stretch, tile_states, largest)
+            blocks.raise_to_tiles(tile_states, stretch.peaks.shape[1], largest)
     response.free_vibration(packed, block.dampings, largest)
     return largest
 
 
-def _radii(record: TiledRecord, oscillators: Oscillators, exact: bool) -> FloatArray:
-    """Return the largest radius of each oscillator, m."""
+def _radii(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike, exact: bool = True
+) -> FloatArray:
+    """Return the largest radius of each oscillator of a grid, m, between samples too if exact."""
+    record, oscillators, shape = _arguments(acceleration, dt, periods, damping)
     squares = over_blocks(lambda block: _radius_block(record, block, exact), oscillators, record)
-    return np.asarray(np.sqrt(squares[0]) / oscillators.omegas**2 * record.scale)
+    return np.reshape(np.sqrt(squares[0]) / oscillators.omegas**2 * record.scale, shape)
 
 
-def _responses(record: TiledRecord, oscillators: Oscillators, exact: bool) -> FloatArray:
-    """Return radius, displacement, velocity / omega, acceleration / omega², each (n,), m."""
+def _responses(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike, exact: bool = True
+) -> ResponseSpectra:
+    """Return the six spectra of a grid of oscillators, between samples too if exact."""
+    record, oscillators, shape = _arguments(acceleration, dt, periods, damping)
     largest = over_blocks(lambda block: _response_block(record, block, exact), oscillators, record)
     largest[0] = np.sqrt(largest[0])
-    return np.asarray(largest / oscillators.omegas**2 * record.scale)
-
-
-def _spectra(
-    lengths: FloatArray, oscillators: Oscillators, shape: tuple[int, ...]
-) -> ResponseSpectra:
-    """Return the six spectra from the four lengths of :func:`_responses`."""
+    # Radius, displacement, velocity / omega and acceleration / omega², m
     omegas = oscillators.omegas
-    per, sd, sv, sa = lengths
+    per, sd, sv, sa = largest / omegas**2 * record.scale
     spectra = per, sd, sv * omegas, sa * omegas**2, sd * omegas, sd * omegas**2
     return ResponseSpectra(*(values.reshape(shape) for values in spectra))

@@ -81,7 +81,7 @@ def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayL
     """Return checked oscillators, (n,)."""
     dt = checks.number("dt", dt, checks.positive)
     period, damping, azimuth = np.broadcast_arrays(
-        checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))),
+        np.atleast_1d(checks.positive("periods", periods)),
         checks.fraction_of_critical("dampings", dampings),
         checks.finite("azimuths", azimuths),
     )

@@ -45,25 +45,9 @@ def north_and_east(
     """
     Resolve the motion of two horizontal sensors into north and east components.
 
-    A sensor at azimuth θ records a_N cos θ + a_E sin θ; two of them are solved for a_N and a_E. The
-    sensors need not be orthogonal.
-
-    Parameters
-    ----------
-    first, second : (n_samples,) ndarray
-        Motion along each sensor, any unit.
-    azimuth_1, azimuth_2 : float
-        Sensor azimuths, degrees clockwise from north.
-
-    Returns
-    -------
-    north, east : (n_samples,) ndarray
-        In the unit of the input.
-
-    Raises
-    ------
-    ValueError
-        If the sensors are within 20 degrees of the same line.
+    A sensor at azimuth θ, degrees clockwise from north, records a_N cos θ + a_E sin θ; two of them
+    are solved for a_N and a_E. The sensors need not be orthogonal; within 20 degrees of the same
+    line they are refused (``ValueError``).
 
     Examples
     --------
@@ -139,17 +123,8 @@ def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
     """
     Describe the records of a station by texts: sources, instrument, level, warnings and flags.
 
-    Parameters
-    ----------
-    stream : Stream
-        Processed records of one station.
-    horizontals : list of Trace
-        Those of them that move the pairs of buildings.
-
-    Returns
-    -------
-    Dataset
-        Scalar texts without control characters, empty where unknown.
+    The horizontals are those of them that move the pairs of buildings. The texts are without
+    control characters, and empty where unknown.
     """
     # Level and files as they were read
     is_final = any(PASSED_THROUGH in step for step in horizontals[0].stats.get("processing", []))
@@ -182,18 +157,10 @@ def _place_facts(horizontals: list[Trace]) -> dict[str, str]:
 
 def header_hypocentre(traces: Iterable[Trace]) -> dict[str, float]:
     """
-    Return the hypocentre in the headers of records: the first one with place and depth.
+    Return the hypocentre in the headers of records of one earthquake, where one has all of it.
 
-    Parameters
-    ----------
-    traces : iterable of Trace
-        Records of one earthquake, in the words of ``formats/text/vocabulary.py``.
-
-    Returns
-    -------
-    dict
-        ``hypocentre_longitude``, ``hypocentre_latitude``, ``hypocentre_depth``, degrees and m;
-        empty where no header has all three.
+    It is ``hypocentre_longitude``, ``hypocentre_latitude`` and ``hypocentre_depth``, degrees and m,
+    of the first header with place and depth, else empty.
     """
     for trace in traces:
         event = trace.stats.get("event") or {}

@@ -24,16 +24,7 @@ MOTION = ("acceleration", "horizontal_azimuth", "sampling_interval")
 
 
 def write_spectra(dataset: xr.Dataset, path: Path) -> None:
-    """
-    Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        From :func:`per_obspy.station_spectra` or :func:`region`.
-    path : Path
-        File to write; folders are made.
-    """
+    """Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all."""
     encoding: dict[Hashable, dict[str, object]] = {
         name: {"_FillValue": None} for name in dataset.coords
     }
@@ -49,19 +40,9 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
 
 def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
     """
-    Read a Dataset that :func:`write_spectra` wrote, identical to the one written.
+    Read a Dataset that :func:`write_spectra` wrote, identical to it, from a file or its bytes.
 
-    Parameters
-    ----------
-    path : Path
-        netCDF file.
-    content : bytes, optional
-        Its bytes, where it has been read already.
-
-    Raises
-    ------
-    CatalogError
-        If the file is missing, damaged or of another kind.
+    A file that is missing, damaged or of another kind is a `CatalogError`.
     """
     # From the file, or from its bytes
     try:
@@ -94,20 +75,8 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     """
     Join the spectra of several stations along ``station``, sorted by name, without the motion.
 
-    Parameters
-    ----------
-    stations : iterable of Dataset
-        From :func:`per_obspy.station_spectra`, on the same periods and dampings.
-
-    Returns
-    -------
-    Dataset
-        Components that a station lacks are missing values.
-
-    Raises
-    ------
-    ValueError
-        If the stations' periods, dampings or azimuths differ.
+    Components that a station lacks are missing values. Periods, dampings and azimuths must be
+    those of all stations, else ``ValueError``.
     """
     ordered = sorted(stations, key=lambda station: str(station["station"].item()))
     spectra = [_for_region(station) for station in ordered]

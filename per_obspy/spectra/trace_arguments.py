@@ -164,18 +164,9 @@ def unit_after_steps(stats: Any) -> str | None:
     Return the unit of the samples of a Trace after the steps that ``stats.processing`` names.
 
     ObsPy changes neither ``units`` nor ``response`` and ``calib`` when it removes a response,
-    differentiates or integrates. A unit without a ``quantity`` is the user's, and is right.
-
-    Parameters
-    ----------
-    stats : obspy Stats
-        Header of a Trace.
-
-    Returns
-    -------
-    str or None
-        ``stats.units`` where no step changes them, None where there are none; ``unknown after
-        STEP`` where the unit is lost.
+    differentiates or integrates. A unit without a ``quantity`` is the user's, and is right. It is
+    ``stats.units`` where no step changes it, None where there is none, and ``unknown after STEP``
+    where the unit is lost.
 
     Examples
     --------

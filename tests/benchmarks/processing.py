@@ -28,7 +28,7 @@ STEPS = {
     "response removal": ("in_acceleration",),
     "first wave": ("noise_windows",),
     "means and lines": ("without_mean", "without_line"),
-    "noise spectra": ("measured_noise",),
+    "noise spectra": ("noise_spectra",),
     "corner by displacement": ("_clean_baseline",),
     "pad and filter": ("pad", "bandpass"),
     "final checks": ("final_findings",),

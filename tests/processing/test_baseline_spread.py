@@ -41,7 +41,7 @@ def test_every_correction_brings_the_velocity_to_rest(earthquake):
     recorded = earthquake() + box(0.02, 24, 200) + box(0.1, 25, 28)
     line = final_line(recorded, TIME, SHAKING.end)
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
-    shifts = baseline_spread._possible_shifts(times, line, np.inf).toarray()
+    shifts = baseline_spread._possible_shifts(times, line, np.inf)
     assert len(shifts) == 55  # all pairs of 11 times
     steps = (times[:, np.newaxis] <= TIME).astype(float)
     for shift in shifts:
@@ -73,7 +73,7 @@ def test_the_spread_is_that_of_records_that_are_corrected_one_by_one(
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
     line = final_line(recorded, TIME, SHAKING.end)
     ratios, misfits, peak = [], [], 0.5 * np.abs(recorded).max()
-    for row in baseline_spread._possible_shifts(times, line, peak).toarray():
+    for row in baseline_spread._possible_shifts(times, line, peak):
         (first, second), after = np.flatnonzero(row), row.sum()
         baseline = np.where(
             times[second] <= TIME, after, box(row[first], times[first], times[second])

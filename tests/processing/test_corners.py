@@ -27,7 +27,7 @@ def trace(highpass=0.1, lowpass=30.0):
     numbers = AttribDict(
         highpass=highpass, lowpass=lowpass, highpass_source="noise", lowpass_source="noise"
     )
-    return Trace(np.zeros(1000), {"delta": 0.01, "per_obspy": numbers})
+    return Trace(np.zeros(1000), {"delta": 0.01, "sensor_dip": 0.0, "per_obspy": numbers})
 
 
 @pytest.mark.parametrize(

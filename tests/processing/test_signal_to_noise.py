@@ -15,7 +15,6 @@ from per_obspy.processing.signal_to_noise import (
     noise_spectra,
     significant_samples,
     sustained_ratio,
-    weakest_ratio,
 )
 
 DT = 0.01
@@ -79,8 +78,8 @@ def test_the_widest_clear_band_is_found():
     assert clear_band(spectra([3, 3, 3]), 2.0) == (0.1, 10.0)
 
 
-def test_the_weakest_ratio_is_that_inside_the_band():
-    assert weakest_ratio(spectra([0.5, 3, 2.5, 4, 0.5]), (0.2, 5.0)) == 2.5
+def test_spectra_inside_a_band():
+    assert spectra([0.5, 3, 2.5, 4, 0.5]).within(0.2, 5.0).ratio.min() == 2.5
 
 
 def test_a_single_line_above_the_noise_is_no_signal():

@@ -1,11 +1,15 @@
 """
 Baselines: means and trends, and those that shift during the shaking.
 
-The latter are found in velocity or displacement.
+The latter are found in velocity or displacement. Three functions are plugins of ``trace.detrend``
+too: ObsPy passes them the samples only, so that their sampling interval is that of the trace whose
+``detrend`` method calls.
 """
 
+import inspect
 from collections.abc import Callable, Iterator
 from itertools import product
+from types import FrameType
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -14,8 +18,9 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from per_obspy.checks import FloatArray, number, positive, record
-from per_obspy.processing import series
 from per_obspy.processing.account import with_note
+from per_obspy.processing.noise_window import picked_onset
+from per_obspy.processing.series import significant_samples
 
 #: Latest start of the quiet end, fraction of the record.
 LATEST_START = 0.9
@@ -32,17 +37,7 @@ FEWEST_AFTER = 10
 
 def without_mean(trace: Trace, pre_event: float = 0.0) -> Trace:
     """
-    Return a copy without the mean of its quiet beginning, or else of the whole record.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-    pre_event : float
-        Length of the noise at the beginning, s; 0 or less: the mean of the whole record.
-
-    Returns
-    -------
-    obspy Trace
+    Return a copy without the mean of its first seconds, or of the whole record where these are 0.
 
     References
     ----------
@@ -56,39 +51,25 @@ def without_mean(trace: Trace, pre_event: float = 0.0) -> Trace:
     return with_note(trace, step, trace.data - mean, mean=mean, mean_of=source)
 
 
-def without_line(trace: Trace) -> Trace:
-    """Return a copy without its least-squares straight line, fitted to the whole record."""
-    samples = series.without_line(trace.data)
-    return with_note(trace, "polynomial trend of order 1 removed", samples, trend_order=1)
-
-
 def without_baseline(trace: Trace, remove: Callable[..., FloatArray], **options: float) -> Trace:
-    """
-    Return a copy without the baseline that one of the functions below removes.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-    remove : callable
-        From samples, m/s2, sampling interval, s, and options to samples.
-    **options : float
-        Further arguments of the function, SI.
-
-    Returns
-    -------
-    obspy Trace
-    """
+    """Return a copy without the baseline that one of the functions below removes."""
     numbers = ", ".join(f"{name} {value:g}" for name, value in options.items())
     samples = remove(trace.data, trace.stats.delta, **options)
     return with_note(trace, f"baseline by {remove.__name__} removed ({numbers})", samples)
 
 
-def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> FloatArray:
+def boore_segments(
+    data: FloatArray,
+    dt: float | None = None,
+    first: float | None = None,
+    second: float | None = None,
+) -> FloatArray:
     r"""
     Remove two baseline shifts from acceleration, one during the shaking and one from then on.
 
-    A line is fitted to the velocity after the shaking; its slope is the shift there, and the shift
-    during the shaking is the part that brings the velocity from zero onto that line:
+    ``trace.detrend("boore_segments")`` calls it. A line is fitted to the velocity after the
+    shaking; its slope is the shift there, and the shift during the shaking is the part that brings
+    the velocity from zero onto that line:
 
     .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = v_f(t_2) / (t_2 - t_1)
 
@@ -96,10 +77,11 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     ----------
     data : (n_samples,) array_like
         Acceleration without the mean of its quiet beginning, m/s2.
-    dt : float
-        Sampling interval, s.
-    first, second : float
-        t1 and t2, s from the first sample; see `crossing_time` for a choice of t2.
+    dt : float, optional
+        Sampling interval, s; that of the calling trace if not given.
+    first, second : float, optional
+        t1 and t2, s from the first sample; the picked onset and the end of the significant shaking
+        if not given. See `crossing_time` for another choice of t2.
 
     Returns
     -------
@@ -109,13 +91,14 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     Raises
     ------
     ValueError
-        Unless 0 <= first < second and ten samples follow the second.
+        If no onset can be picked, or unless 0 <= first < second and ten samples follow the second.
 
     References
     ----------
     Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211, eq. (1)-(3).
     """
-    samples, time = _samples_and_times(data, dt)
+    samples, dt, time = _record(data, dt, inspect.currentframe())
+    first, second = _shaking(samples, dt, first, second)
     if not 0 <= first < second <= time[-1] - FEWEST_AFTER * dt:
         raise ValueError(
             f"first and second must be times within the record, got {first:g} and {second:g} s"
@@ -127,83 +110,45 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     return samples - shift
 
 
-def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
+def crossing_time(samples: FloatArray, dt: float, first: float, second: float) -> float:
     """
-    Return the residual velocity at the end of the shaking, m/s.
-
-    It is that of the line through the velocity from then on. The ground has come to rest by then,
-    so that this is the integral of the baseline's shifts during the shaking.
-
-    Parameters
-    ----------
-    data : (n_samples,) array_like
-        Acceleration without the mean of its quiet beginning, m/s2.
-    dt : float
-        Sampling interval, s.
-    end : float
-        Of the shaking, s from the first sample.
-
-    Returns
-    -------
-    float
-        At least 0.
-
-    Examples
-    --------
-    >>> shifted = np.zeros(1000)
-    >>> shifted[200:300] = 0.05  # m/s2 for 1 s
-    >>> round(residual_velocity(shifted, 0.01, 5.0), 12)
-    0.05
-    """
-    constant, slope = final_line(*_samples_and_times(data, dt), end)
-    return abs(constant + slope * end)
-
-
-def crossing_time(data: FloatArray, dt: float, first: float, second: float) -> float:
-    """
-    Return the t2 at which the line through the final velocity crosses zero.
+    Return the t2 at which the line through the final velocity crosses zero, s.
 
     It must lie between the two times, else the second is returned. With it the shift during the
     shaking vanishes: the baseline has a single step.
-
-    Parameters
-    ----------
-    data : (n_samples,) array_like
-        As in `boore_segments`.
-    dt, first, second : float
-        s.
-
-    Returns
-    -------
-    float
-        s.
 
     References
     ----------
     Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211: "v0 correction".
     """
-    constant, slope = final_line(*_samples_and_times(data, dt), second)
+    constant, slope = final_line(samples, sample_times(samples, dt), second)
     crossing = -constant / slope if slope else np.inf
     return float(crossing) if first < crossing < second else second
 
 
-def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> FloatArray:
+def velocity_residual(
+    data: FloatArray,
+    dt: float | None = None,
+    onset: float | None = None,
+    end: float | None = None,
+) -> FloatArray:
     """
     Remove the slope of the residual velocity before and after the shaking from acceleration.
 
-    Before the onset the velocity is fitted by a line or a parabola, after the shaking by a
-    polynomial up to third order; a cubic that meets both with their slopes bridges the shaking.
-    Ends of the shaking are tried in steps, and the combination with the smallest velocity outside
-    the shaking is used.
+    ``trace.detrend("velocity_residual")`` calls it. Before the onset the velocity is fitted by a
+    line or a parabola, after the shaking by a polynomial up to third order; a cubic that meets both
+    with their slopes bridges the shaking. Ends of the shaking are tried in steps, and the
+    combination with the smallest velocity outside the shaking is used.
 
     Parameters
     ----------
     data : (n_samples,) array_like
         Acceleration without the mean of its quiet beginning, m/s2.
-    dt : float
-        Sampling interval, s.
-    onset, end : float
-        Of the shaking, s from the first sample; the end is the earliest that is tried.
+    dt : float, optional
+        Sampling interval, s; that of the calling trace if not given.
+    onset, end : float, optional
+        Of the shaking, s from the first sample; the end is the earliest that is tried. The picked
+        onset and the end of the significant shaking if not given.
 
     Returns
     -------
@@ -213,14 +158,16 @@ def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> 
     Raises
     ------
     ValueError
-        Unless 0 < onset < end and a tenth of the record follows the end.
+        If no onset can be picked, or unless 0 < onset < end and a tenth of the record follows the
+        end.
 
     References
     ----------
     Jones, Kalkan & Stephens 2017, U.S. Geological Survey Open-File Report 2017-1008: the idea of
     the adaptive baseline correction.
     """
-    samples, time = _samples_and_times(data, dt)
+    samples, dt, time = _record(data, dt, inspect.currentframe())
+    onset, end = _shaking(samples, dt, onset, end)
     latest = LATEST_START * time[-1]
     if not 0 < onset < end <= latest:
         raise ValueError(
@@ -256,18 +203,21 @@ def _residual_baselines(
         yield np.where(before, first(time), np.where(after, last(time), bridge(time)))
 
 
-def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> FloatArray:
+def displacement_polynomial(
+    data: FloatArray, dt: float | None = None, order: int = 6
+) -> FloatArray:
     """
     Remove the second derivative of the polynomial that fits the displacement from acceleration.
 
-    The polynomial has no constant and no linear term: the ground starts at rest.
+    ``trace.detrend("displacement_polynomial")`` calls it. The polynomial has no constant and no
+    linear term: the ground starts at rest.
 
     Parameters
     ----------
     data : (n_samples,) array_like
         Acceleration, m/s2.
-    dt : float
-        Sampling interval, s.
+    dt : float, optional
+        Sampling interval, s; that of the calling trace if not given.
     order : int
         Of the polynomial, at least 2.
 
@@ -281,7 +231,7 @@ def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> Floa
     Ancheta et al. 2013, PEER report 2013/03, NGA-West2 database: post-processing by a sixth-order
     polynomial.
     """
-    samples, time = _samples_and_times(data, dt)
+    samples, dt, time = _record(data, dt, inspect.currentframe())
     if order < 2:
         raise ValueError(f"order must be at least 2, got {order}")
     velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
@@ -296,31 +246,67 @@ def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> Floa
     return np.asarray(samples - curvature @ coefficients)
 
 
-def _samples_and_times(data: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-    """Return checked samples and their times, s."""
+def _record(
+    data: FloatArray, dt: float | None, frame: FrameType | None
+) -> tuple[FloatArray, float, FloatArray]:
+    """Return checked samples, their interval and times, s; without one that of ``detrend``."""
     samples = record("data", data)
-    return samples, np.arange(float(samples.size)) * number("dt", dt, positive)
+    if dt is None:
+        # ObsPy keeps the trace to itself: it is the ``self`` of the frame that called the plugin
+        caller = frame.f_back if frame is not None else None
+        trace = caller.f_locals.get("self") if caller is not None else None
+        if not isinstance(trace, Trace):
+            raise ValueError("dt is required where no trace is detrended: give the interval in s")
+        dt = trace.stats.delta
+    dt = number("dt", dt, positive)
+    return samples, dt, sample_times(samples, dt)
+
+
+def _shaking(
+    samples: FloatArray, dt: float, onset: float | None, end: float | None
+) -> tuple[float, float]:
+    """Return onset and end of the shaking, s: picked, and of the significant motion, if None."""
+    if onset is not None and end is not None:
+        return onset, end
+    picked = picked_onset(Trace(samples, {"delta": dt}))
+    if picked is None:
+        raise ValueError("no onset of the shaking can be picked: give the times of the shaking")
+    # What is given is not replaced
+    first = picked[0]
+    last = first + significant_samples(samples[round(first / dt) :]) * dt
+    return first if onset is None else onset, last if end is None else end
+
+
+def sample_times(samples: FloatArray, dt: float) -> FloatArray:
+    """Return the times of samples from the first one on, s."""
+    return np.arange(float(samples.size)) * dt
 
 
 def final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[float, float]:
     """
-    Return the line through the velocity from a time on.
+    Return constant and slope, m/s and m/s2, of the line through the velocity from a time on.
 
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        Acceleration, m/s2.
-    time : (n_samples,) ndarray
-        s.
-    start : float
-        s; at least two samples follow.
-
-    Returns
-    -------
-    constant, slope : float
-        m/s and m/s2; the line has the value constant + slope * time.
+    The samples are acceleration, m/s2; at least two follow the start.
     """
     velocity = cumulative_trapezoid(samples, time, initial=0)
     after = time >= start
     constant, slope = Polynomial.fit(time[after], velocity[after], 1).convert().coef
     return float(constant), float(slope)
+
+
+def residual_velocity(samples: FloatArray, time: FloatArray, end: float) -> float:
+    """
+    Return the size of the residual velocity at the end of the shaking, m/s.
+
+    It is that of the line through the velocity from then on. The ground has come to rest by then,
+    so that this is the integral of the baseline's shifts during the shaking.
+
+    Examples
+    --------
+    >>> shifted = np.zeros(1000)
+    >>> shifted[200:300] = 0.05  # m/s2 for 1 s
+    >>> round(residual_velocity(shifted, sample_times(shifted, 0.01), 5.0), 12)
+    0.05
+    """
+    constant, slope = final_line(samples, time, end)
+    return abs(constant + slope * end)

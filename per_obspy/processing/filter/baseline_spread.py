@@ -5,6 +5,7 @@ A baseline that shifts during the shaking leaves a straight line in the final ve
 does not show when the baseline shifted, and PER at long periods depends on that.
 """
 
+from collections.abc import Iterable
 from itertools import combinations
 from typing import NamedTuple
 
@@ -14,11 +15,10 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 from scipy.signal.windows import tukey
-from scipy.sparse import csr_array
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
-from per_obspy.processing.filter.baseline import final_line
+from per_obspy.processing.filter.baseline import final_line, residual_velocity, sample_times
 from per_obspy.processing.filter.butterworth import butterworth_amplitude, thin_spectrum
 from per_obspy.spectra.elastic import per_spectrum
 
@@ -69,11 +69,12 @@ def longest_certain_period(
     settings: Processing,
 ) -> float:
     r"""
-    Return the period up to which PER hardly depends on when the baseline shifted.
+    Return the period up to which PER hardly depends on when the baseline shifted, s.
 
-    A baseline shifts at t1 and t2, which are all pairs out of 11 times that cut the energy of the
-    shaking into equal parts. The line through the final velocity gives both shifts, so that every
-    corrected velocity ends at zero; those above half the peak acceleration are left out:
+    It is infinite if no shift is suspected, or if the spread is small at all `PERIODS`. A baseline
+    shifts at t1 and t2, which are all pairs out of 11 times that cut the energy of the shaking into
+    equal parts. The line through the final velocity gives both shifts, so that every corrected
+    velocity ends at zero; those above half the peak acceleration are left out:
 
     .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = (v_0 + a_f t_2) / (t_2 - t_1)
 
@@ -82,10 +83,9 @@ def longest_certain_period(
 
     Parameters
     ----------
-    plain : (n_samples,) ndarray
-        Acceleration without the mean of its quiet beginning, m/s2.
-    corrected : (n_samples,) ndarray
-        The same record without its baseline as it is used, tapered, m/s2.
+    plain, corrected : (n_samples,) ndarray
+        Acceleration without the mean of its quiet beginning, and without its baseline as it is
+        used, tapered; m/s2.
     dt : float
         Sampling interval, s.
     shaking : Shaking
@@ -95,50 +95,34 @@ def longest_certain_period(
     settings : Processing
         Order of the filter, taper, and the spread that is allowed (``baseline_spread``).
 
-    Returns
-    -------
-    float
-        s; infinite if no shift is suspected, or if the spread is small at all `PERIODS`.
-
     References
     ----------
     Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211: the two shifts, and how strongly displacement
     depends on their times.
     """
-    time: FloatArray = np.arange(float(plain.size)) * dt
+    time, interval = sample_times(plain, dt), dt * _thinning(dt)
     # Is the velocity that stays large for the record as it is used?
-    interval = dt * _thinning(dt)
     (used,) = _filtered(corrected[np.newaxis], dt, highpass, settings.order)
     peak = np.abs(cumulative_trapezoid(used, dx=interval)).max()
-    straight = (plain, detrend(plain))
-    if min(_velocity_left(samples, time, shaking) for samples in straight) <= SUSPECTED * peak:
+    if _velocity_left(plain, time, shaking) <= SUSPECTED * peak:
         return np.inf
-    # Shifts that fit the final velocity, and the record with steps at their times
-    times = _times_of_shifts(plain, time, shaking)
-    line = final_line(plain, time, shaking.end)
+    # Shifts that fit the final velocity
+    times, line = _times_of_shifts(plain, time, shaking), final_line(plain, time, shaking.end)
     shifts = _possible_shifts(times, line, LARGEST * float(np.abs(used).max()))
-    if not shifts.shape[0]:
+    if not shifts.size:
         return float(PERIODS[0])
-    motions = _corrected_motions(plain, time, times, shifts, highpass, settings)
-    spread = _spread(used, motions, interval, _weights(plain, time, times, shifts))
+    motions = _corrected(plain, time, times, shifts, highpass, settings)
+    # Spread of the logarithm of PER about that of the record as it is used
+    ratios = _log_per(motions, interval) - _log_per([used], interval)
+    spread = np.sqrt(_weights(plain, time, times, shifts) @ np.square(ratios))
     return _last_within(spread, settings.baseline_spread)
 
 
-def _spread(
-    used: FloatArray, motions: FloatArray, interval: float, weights: FloatArray
-) -> FloatArray:
-    """Return the weighted root mean square of ln PER over that of the record as it is used."""
-    reference, *spectra = [
-        np.log(per_spectrum(motion, interval, PERIODS)) for motion in (used, *motions)
-    ]
-    return np.asarray(np.sqrt(weights @ (spectra - reference) ** 2))
-
-
-def _corrected_motions(
+def _corrected(
     plain: FloatArray,
     time: FloatArray,
     times: FloatArray,
-    shifts: csr_array,
+    shifts: FloatArray,
     highpass: float,
     settings: Processing,
 ) -> FloatArray:
@@ -149,11 +133,19 @@ def _corrected_motions(
     return np.asarray(filtered[0] - shifts @ filtered[1:])
 
 
+def _log_per(motions: Iterable[FloatArray], interval: float) -> FloatArray:
+    """Return the logarithms of PER of motions at all periods, (n_motions, n_periods)."""
+    return np.log([per_spectrum(motion, interval, PERIODS) for motion in motions])
+
+
 def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
-    """Return the velocity that a baseline leaves before and after the shaking, m/s."""
-    constant, slope = final_line(samples, time, shaking.end)
-    before = np.trapezoid(samples[time <= shaking.onset], dx=time[1])
-    return float(abs(before) + abs(constant + slope * shaking.end))
+    """Return the velocity that a shift leaves before and after the shaking, without a line, m/s."""
+    left, before = [], time <= shaking.onset
+    # The record as it is, or without its straight line: the smaller one
+    for straight in (samples, detrend(samples)):
+        early = abs(np.trapezoid(straight[before], dx=time[1]))
+        left.append(early + residual_velocity(straight, time, shaking.end))
+    return float(min(left))
 
 
 def _thinning(dt: float) -> int:
@@ -180,7 +172,7 @@ def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> F
     return np.array([shaking.onset, *inner, shaking.end])
 
 
-def _possible_shifts(times: FloatArray, line: tuple[float, float], largest: float) -> csr_array:
+def _possible_shifts(times: FloatArray, line: tuple[float, float], largest: float) -> FloatArray:
     """
     Return the shifts at each pair of times that turn the final line of the velocity to zero.
 
@@ -195,11 +187,11 @@ def _possible_shifts(times: FloatArray, line: tuple[float, float], largest: floa
         if abs(between) < largest:
             rows.append(np.zeros(times.size))
             rows[-1][[first, second]] = between, slope - between
-    return csr_array(np.reshape(rows, (-1, times.size)))
+    return np.array(rows)
 
 
 def _weights(
-    plain: FloatArray, time: FloatArray, times: FloatArray, shifts: csr_array
+    plain: FloatArray, time: FloatArray, times: FloatArray, shifts: FloatArray
 ) -> FloatArray:
     """Return the weight of each correction, from the displacement that it leaves in the shaking."""
     velocity = cumulative_trapezoid(plain, time, initial=0)

@@ -23,15 +23,7 @@ def taper(trace: Trace, fraction: float) -> Trace:
     """
     Return a copy with ends that rise from and fall to zero as half a Hann window each.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-    fraction : float
-        Of the record at each end, dimensionless, at most 0.5.
-
-    Returns
-    -------
-    obspy Trace
+    The fraction of the record at each end is at most 0.5; with 0 the trace stays as it is.
     """
     if not fraction:
         return trace
@@ -44,24 +36,12 @@ def taper(trace: Trace, fraction: float) -> Trace:
 
 def pad(trace: Trace, highpass: float, order: int) -> Trace:
     """
-    Return a copy with zeros before and after.
+    Return a copy with zeros before and after, for the filter of a corner, Hz, and an order.
 
     They last 1.5 order / highpass seconds in total, half on each side, and hold the transients of
     the acausal filter. They are kept: velocity and displacement integrated from the filtered record
     return to rest in them, and oscillators start from rest only before them. ``starttime`` moves to
     the first zero. The end gets the few samples more that make the length quick to transform.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-    highpass : float
-        Corner of the filter to come, Hz.
-    order : int
-        Order n of the filter to come.
-
-    Returns
-    -------
-    obspy Trace
 
     References
     ----------
@@ -87,17 +67,9 @@ def thin_spectrum(
     Return the low frequencies of signals with zero pads: those of a grid with fewer points.
 
     A long record is transformed as the sum of its interleaved parts, each turned by its delay: at
-    the low frequencies alone that takes a tenth of the memory.
-
-    Parameters
-    ----------
-    signals : (..., n_samples) ndarray
-    dt : float
-        Sampling interval, s.
-    highpass, order
-        Of the filter to come, Hz, which decide the length of the pads; a corner of 0 needs none.
-    thin : int
-        Samples of the record for each point of the grid.
+    the low frequencies alone that takes a tenth of the memory. Corner and order of the filter to
+    come decide the length of the pads (a corner of 0 needs none); ``thin`` samples of the signals,
+    (..., n_samples), make one point of the grid.
 
     Returns
     -------
@@ -175,26 +147,13 @@ def _power(values: FloatArray, exponent: int) -> FloatArray:
 
 
 def acausal_bandpass(
-    data: FloatArray, df: float, highpass: float, lowpass: float, order: int = 5
+    samples: FloatArray, df: float, highpass: float, lowpass: float, order: int = 5
 ) -> FloatArray:
     """
-    Filter samples without phase in the frequency domain, circularly: pad them first.
+    Filter samples at a rate, Hz, without phase in the frequency domain, circularly: pad them first.
 
-    Parameters
-    ----------
-    data : (n_samples,) array_like
-        Any unit.
-    df : float
-        Sampling rate, Hz (ObsPy's name for it).
-    highpass, lowpass, order
-        As in `butterworth_amplitude`.
-
-    Returns
-    -------
-    (n_samples,) ndarray
-        In the unit of the data.
+    Corners and order are those of `butterworth_amplitude`.
     """
-    samples = finite("data", data)
     spectrum = rfft(samples)
     frequencies = rfftfreq(samples.size, 1 / df)
     # Block by block: powers of all frequencies of a day take more memory than the record
@@ -206,23 +165,74 @@ def acausal_bandpass(
 
 
 def bandpass(trace: Trace, highpass: float, lowpass: float, order: int) -> Trace:
-    """
-    Return a copy filtered by `acausal_bandpass`.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        Padded.
-    highpass, lowpass, order
-        As in `butterworth_amplitude`.
-
-    Returns
-    -------
-    obspy Trace
-    """
+    """Return a copy of a padded trace filtered by `acausal_bandpass`."""
     rate = trace.stats.sampling_rate
     samples = acausal_bandpass(trace.data, rate, highpass, lowpass, order)
     # Corners as applied: a high-pass at 0 is none
     applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
     step = f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz"
     return with_note(trace, step, samples, order=order, **applied)
+
+
+def acausal_butterworth(
+    data: FloatArray,
+    df: float,
+    highpass: float | None = None,
+    lowpass: float | None = None,
+    order: int = 5,
+    *,
+    freqmin: float | None = None,
+    freqmax: float | None = None,
+) -> FloatArray:
+    """
+    Filter samples without phase by a Butterworth amplitude; pad them with zeros first.
+
+    ``trace.filter("acausal_butterworth", freqmin=..., freqmax=...)`` calls it.
+
+    Parameters
+    ----------
+    data : (n_samples,) array_like
+        Any unit.
+    df : float
+        Sampling rate, Hz; ObsPy passes it.
+    highpass, lowpass : float, optional
+        Corners, Hz; without one of them the filter is a low-pass or a high-pass.
+    order : int
+        Order n of both factors.
+    freqmin, freqmax : float, optional
+        ObsPy's names of ``highpass`` and ``lowpass``.
+
+    Returns
+    -------
+    (n_samples,) ndarray
+        In the unit of the data.
+
+    Raises
+    ------
+    ValueError
+        If no corner is set, one is set twice, is not positive or is above the Nyquist
+        frequency, or if the low-pass corner is not above the high-pass corner.
+    """
+    nyquist = number("df", df, positive) / 2.0
+    low = _corner(nyquist, highpass=highpass, freqmin=freqmin)
+    high = _corner(nyquist, lowpass=lowpass, freqmax=freqmax)
+    # At least one of them, and rising
+    if low is None and high is None:
+        raise ValueError("give highpass or freqmin, lowpass or freqmax, or both; got neither")
+    if low is not None and high is not None and low >= high:
+        raise ValueError(f"highpass = {low:g} Hz must be below lowpass = {high:g} Hz")
+    samples = finite("data", data)
+    return acausal_bandpass(samples, df, low or 0.0, np.inf if high is None else high, order)
+
+
+def _corner(nyquist: float, **names: float | None) -> float | None:
+    """Return a corner that has two names, of which only one may be used, up to the Nyquist, Hz."""
+    given = {name: value for name, value in names.items() if value is not None}
+    if len(given) > 1:
+        both = " and ".join(f"{name} = {value:g} Hz" for name, value in given.items())
+        raise ValueError(f"{both} are the same corner: give one")
+    # Under the name that is not ObsPy's
+    name, value = next(iter(names)), next(iter(given.values()), None)
+    if value is not None and not number(name, value, positive) <= nyquist:
+        raise ValueError(f"{name} = {value:g} Hz is above the Nyquist frequency {nyquist:g} Hz")
+    return value

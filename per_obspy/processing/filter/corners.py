@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
+from per_obspy.processing import series
 from per_obspy.processing.account import (
     SHIFTED_BASELINE,
     Findings,
@@ -24,6 +25,7 @@ from per_obspy.processing.account import (
     with_note,
     with_numbers,
 )
+from per_obspy.processing.components import is_horizontal
 from per_obspy.processing.earthquake import Corner
 from per_obspy.processing.filter.baseline import (
     LATEST_START,
@@ -31,9 +33,9 @@ from per_obspy.processing.filter.baseline import (
     crossing_time,
     displacement_polynomial,
     residual_velocity,
+    sample_times,
     velocity_residual,
     without_baseline,
-    without_line,
     without_mean,
 )
 from per_obspy.processing.filter.baseline_spread import (
@@ -42,14 +44,11 @@ from per_obspy.processing.filter.baseline_spread import (
     without_drift,
 )
 from per_obspy.processing.filter.butterworth import butterworth_amplitude, taper, thin_spectrum
-from per_obspy.processing.series import significant_samples
 from per_obspy.processing.signal_to_noise import (
     NoiseSpectra,
     clear_band,
     noise_spectra,
     sustained_ratio,
-    weakest_ratio,
-    within,
 )
 
 #: Highest low-pass corner, fraction of the Nyquist frequency.
@@ -81,6 +80,9 @@ def choose_corners(trace: Trace, settings: Processing, fallback: Callable[[], Co
     """
     Return a copy of one record without its baseline, tapered, with the corners of its filter.
 
+    With ``permanent_offset`` the record keeps its permanent displacement: its residual velocity is
+    removed, and one cycle in the record limits the usable periods without being applied.
+
     Parameters
     ----------
     trace : obspy Trace
@@ -91,75 +93,68 @@ def choose_corners(trace: Trace, settings: Processing, fallback: Callable[[], Co
         Returns the high-pass corner of a record without measurable noise, see
         :func:`.fallback_highpass`.
 
-    Returns
-    -------
-    obspy Trace
-
     Raises
     ------
     RecordRejected
-        If the signal never clears the noise, or no corner cleans the displacement.
+        If the signal never clears the noise, no corner cleans the displacement, or a record whose
+        offset is kept is not quiet before and after the shaking.
     """
     plain = without_mean(trace, float(trace.stats.per_obspy.noise))
+    dt = plain.stats.delta
     shaking, is_quiet = shaking_of(plain)
-    if is_quiet:
-        residual = residual_velocity(plain.data, plain.stats.delta, shaking.end)
+    if is_quiet and not settings.permanent_offset:
+        residual = residual_velocity(plain.data, sample_times(plain.data, dt), shaking.end)
         plain = with_numbers(plain, residual_velocity=residual)
-    level = without_line(plain)
     # Corners by noise, then the baseline and the high-pass corner by displacement
-    level, lowest, lowpass = _limits(level, settings, fallback)
-    if settings.highpass is not None:
-        ready = taper(level, settings.taper)
-        highpass = Corner(settings.highpass, "configuration")
+    if settings.permanent_offset:
+        ready, highpass, lowpass, applied = _keep_offset(plain, shaking, is_quiet, settings)
     else:
-        ready, highpass = _clean_baseline(level, lowest, settings)
+        ready, highpass, lowpass = _limit_band(plain, settings, fallback)
+        applied = highpass.frequency
+    # Period from which on PER depends on when the baseline shifted
     if is_quiet:
-        ready = _with_certain_period(plain, ready, shaking, highpass.frequency, settings)
-    findings = Findings(settings.checks)
-    findings.compare("bandwidth", lowpass.frequency / highpass.frequency)
-    return with_corners(judge(ready, findings), highpass, lowpass)
+        certain = longest_certain_period(plain.data, ready.data, dt, shaking, applied, settings)
+        ready = with_numbers(ready, certain_period=certain) if np.isfinite(certain) else ready
+    if applied:
+        findings = Findings(settings.checks)
+        findings.compare("bandwidth", lowpass.frequency / applied)
+        ready = judge(ready, findings)
+    return with_corners(ready, highpass, lowpass)
 
 
-def keep_offset(trace: Trace, settings: Processing) -> Trace:
-    """
-    Return a copy of one record that keeps its permanent displacement.
+def with_corners(trace: Trace, highpass: Corner, lowpass: Corner) -> Trace:
+    """Return a copy with both corners and their reasons."""
+    for name, (frequency, reason) in (("highpass", highpass), ("lowpass", lowpass)):
+        numbers: dict[str, Value] = {name: frequency, f"{name}_source": reason}
+        trace = with_note(trace, f"{name} corner {frequency:.4g} Hz: {reason}", **numbers)
+    return trace
 
-    Its residual velocity is removed, and it is not high-passed.
 
-    Parameters
-    ----------
-    trace : obspy Trace
-        m/s2, with ``noise`` (s) in ``stats.per_obspy``.
-    settings : Processing
-        Every number of the chain.
-
-    Returns
-    -------
-    obspy Trace
-        Tapered. ``highpass`` is one cycle in the record: it limits the usable periods and is not
-        applied.
-
-    Raises
-    ------
-    RecordRejected
-        If the record is not quiet before and after the shaking.
-    """
-    plain = without_mean(trace, float(trace.stats.per_obspy.noise))
-    shaking, is_quiet = shaking_of(plain)
+def _keep_offset(
+    plain: Trace, shaking: Shaking, is_quiet: bool, settings: Processing
+) -> tuple[Trace, Corner, Corner, float]:
+    """Return the record with its permanent displacement, its corners, and no high-pass, 0 Hz."""
     if not is_quiet:
         raise RecordRejected(
-            trace.id,
+            plain.id,
             "permanent offset needs quiet ends, shakes from "
             f"{shaking.onset:.1f} to {shaking.end:.1f} s",
         )
     straight = without_baseline(plain, velocity_residual, **shaking._asdict())
-    out = with_numbers(taper(straight, settings.taper), baseline="velocity residual")
-    out = _with_certain_period(plain, out, shaking, 0.0, settings)
-    # Corners that limit the usable periods
-    lowest = Corner(lowest_highpass(out).frequency, "not applied: permanent offset kept")
-    return with_corners(
-        out, lowest, highest_corner(out, settings.lowpass or settings.highest_lowpass)
-    )
+    ready = with_numbers(taper(straight, settings.taper), baseline="velocity residual")
+    lowest = Corner(lowest_highpass(ready).frequency, "not applied: permanent offset kept")
+    # One cycle in the record limits the usable periods alone
+    return ready, lowest, highest_corner(ready, settings.lowpass or settings.highest_lowpass), 0.0
+
+
+def _limit_band(
+    plain: Trace, settings: Processing, fallback: Callable[[], Corner]
+) -> tuple[Trace, Corner, Corner]:
+    """Return the tapered record without its baseline, and its corners."""
+    level, lowest, lowpass = _limits(plain, settings, fallback)
+    if settings.highpass is None:
+        return *_clean_baseline(level, lowest, settings), lowpass
+    return taper(level, settings.taper), Corner(settings.highpass, "configuration"), lowpass
 
 
 def shaking_of(trace: Trace) -> tuple[Shaking, bool]:
@@ -167,29 +162,25 @@ def shaking_of(trace: Trace) -> tuple[Shaking, bool]:
     dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
     # A baseline that shifted has more energy at the end of the record than the shaking
     level = without_drift(trace.data, dt)
-    end = onset + significant_samples(level[round(onset / dt) :]) * dt
+    end = onset + series.significant_samples(level[round(onset / dt) :]) * dt
     latest = LATEST_START * (trace.stats.npts - 1) * dt
     return Shaking(onset, end), FEWEST * dt <= onset < end <= latest
 
 
-def _with_certain_period(
-    plain: Trace, ready: Trace, shaking: Shaking, highpass: float, settings: Processing
-) -> Trace:
-    """Return the tapered record with the period from which on PER depends on when it shifted."""
-    longest = longest_certain_period(
-        plain.data, ready.data, plain.stats.delta, shaking, highpass, settings
-    )
-    return with_numbers(ready, certain_period=longest) if np.isfinite(longest) else ready
-
-
 def _limits(
-    trace: Trace, settings: Processing, fallback: Callable[[], Corner]
+    plain: Trace, settings: Processing, fallback: Callable[[], Corner]
 ) -> tuple[Trace, Corner, Corner]:
-    """Return the record with its noise, the lowest high-pass and the highest low-pass corner."""
+    """Return the record without a line, the lowest high-pass and the highest low-pass corner."""
+    samples = series.without_line(plain.data)
+    trace = with_note(plain, "polynomial trend of order 1 removed", samples, trend_order=1)
     # Outermost corners that length and sampling of the record allow
     lowest = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
     lowpass = highest_corner(trace, settings.highest_lowpass)
-    trace, band = _clear_band(trace, lowest, lowpass, settings)
+    dt, seconds, band = trace.stats.delta, float(trace.stats.per_obspy.noise), None
+    if seconds >= FEWEST_NOISE_SAMPLES * dt:
+        spectra = noise_spectra(trace.data, dt, seconds, settings.smoothing)
+        spectra = spectra.within(lowest.frequency, lowpass.frequency)
+        trace, band = _clear_band(trace, spectra, lowest, lowpass, settings)
     # Without measurable noise the magnitude decides
     lowest, lowpass = band or (max(fallback(), lowest), lowpass)
     if settings.lowpass is not None:
@@ -200,18 +191,14 @@ def _limits(
 
 
 def _clear_band(
-    trace: Trace, lowest: Corner, lowpass: Corner, settings: Processing
+    trace: Trace, spectra: NoiseSpectra, lowest: Corner, lowpass: Corner, settings: Processing
 ) -> tuple[Trace, tuple[Corner, Corner] | None]:
     """Return the record with its signal-to-noise ratio, and the corners of the clear band."""
-    spectra = measured_noise(trace, settings.smoothing)
-    if spectra is None:
-        return trace, None
-    spectra = within(spectra, lowest.frequency, lowpass.frequency)
     best, findings = sustained_ratio(spectra), Findings(settings.checks)
     findings.compare("signal_to_noise", best)
     # Band in which periods of buildings lie
-    weakest = weakest_ratio(spectra, settings.required_band)
-    findings.compare("clear_band", weakest, *settings.required_band)
+    weakest = spectra.within(*settings.required_band).ratio.min(initial=np.inf)
+    findings.compare("clear_band", float(weakest), *settings.required_band)
     trace = judge(trace, findings)
     band = clear_band(spectra, settings.checks.signal_to_noise.threshold)
     if band is None:
@@ -224,14 +211,6 @@ def _clear_band(
     return trace, (lowest, lowpass)
 
 
-def measured_noise(trace: Trace, bandwidth: float) -> NoiseSpectra | None:
-    """Return the spectra of signal and noise of a record without baseline, None without noise."""
-    seconds = float(trace.stats.per_obspy.get("noise", 0.0))
-    if seconds < FEWEST_NOISE_SAMPLES * trace.stats.delta:
-        return None
-    return noise_spectra(trace.data, trace.stats.delta, seconds, bandwidth)
-
-
 def _clean_baseline(trace: Trace, lowest: Corner, settings: Processing) -> tuple[Trace, Corner]:
     """
     Return the record with the plain baseline if any corner cleans that, else with the best one.
@@ -240,18 +219,18 @@ def _clean_baseline(trace: Trace, lowest: Corner, settings: Processing) -> tuple
     there: with it the highest corner is used.
     """
     highest = settings.highpass_range[1]
-    clean = list[tuple[Trace, Corner]]()
+    clean = list[tuple[Corner, Trace]]()
     for name, candidate in _baselines(trace):
         record = with_numbers(taper(candidate, settings.taper), baseline=name)
         corner = clean_corner(record, lowest, highest, settings)
         # The plain baseline goes before all others
         if corner is not None and candidate is trace:
             return record, corner
-        clean += [(record, corner)] if corner is not None else []
+        clean += [(corner, record)] if corner is not None else []
     if not clean:
         reason = f"displacement drifts with every baseline and the corner at {highest:g} Hz"
         raise RecordRejected(trace.id, reason)
-    record, corner = min(clean, key=lambda one: one[1].frequency)
+    corner, record = min(clean, key=lambda one: one[0].frequency)
     return record, max(corner, Corner(highest, f"highest allowed: {SHIFTED_BASELINE}"))
 
 
@@ -259,10 +238,9 @@ def _baselines(trace: Trace) -> Iterator[tuple[str, Trace]]:
     """Yield the record, then the record without each baseline that may shift in the shaking."""
     yield "mean and line", trace
     yield "displacement polynomial", without_baseline(trace, displacement_polynomial)
-    shaking, is_quiet = shaking_of(trace)
+    (onset, end), is_quiet = shaking_of(trace)
     # Shifts between quiet ends
     if is_quiet:
-        onset, end = shaking
         second = crossing_time(trace.data, trace.stats.delta, onset, end)
         yield "two segments", without_baseline(trace, boore_segments, first=onset, second=second)
         yield "velocity residual", without_baseline(trace, velocity_residual, onset=onset, end=end)
@@ -286,20 +264,7 @@ def clean_corner(
     """
     Return the lowest high-pass corner whose displacement is clean, or None if no corner is.
 
-    Parameters
-    ----------
-    tapered : obspy Trace
-        Without its baseline, m/s2.
-    lowest : Corner
-        Allowed by noise and duration.
-    highest : float
-        Allowed corner, Hz.
-    settings : Processing
-        ``drift`` of a clean displacement, and ``order`` of the filter.
-
-    Returns
-    -------
-    Corner or None
+    The record, m/s2, is without its baseline; the lowest corner is that of noise and duration.
     """
     low, dt = lowest.frequency, tapered.stats.delta
     drift = displacement_drift(tapered.data, dt, low, settings.order)
@@ -313,28 +278,13 @@ def displacement_drift(
     acceleration: FloatArray, dt: float, lowest: float, order: int
 ) -> Callable[[float], float]:
     r"""
-    Return the share of drift in a record's displacement as a function of the high-pass corner.
+    Return the share of drift in a record's displacement as a function of the high-pass corner, Hz.
 
     .. math:: d(f_{hp}) = \max_t |p_5(t)| / \max_t |u(t)|
 
     where u is the displacement of the filtered record, without its pads, and p5 the polynomial of
-    fifth order fitted to it.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) ndarray
-        Tapered, m/s2.
-    dt : float
-        Sampling interval, s.
-    lowest : float
-        Lowest corner to be tried, Hz: it decides the length of the pads.
-    order : int
-        Of the Butterworth filter.
-
-    Returns
-    -------
-    callable
-        From the corner, Hz, to the drift, dimensionless.
+    fifth order fitted to it. The acceleration, m/s2, is tapered; the lowest corner to be tried
+    decides the length of the pads.
 
     References
     ----------
@@ -371,25 +321,11 @@ def clean_highpass(
     drift: Callable[[float], float], lowest: float, highest: float, target: float
 ) -> float | None:
     """
-    Return the lowest corner at which, and above which, the displacement is clean.
+    Return the lowest corner at which, and above which, the displacement is clean, Hz.
 
-    Corners are tried from the highest down in steps of a fifth until the drift exceeds the target;
-    the root inside that step is found by Brent's method in logarithmic frequency, to 0.1 % of the
-    corner.
-
-    Parameters
-    ----------
-    drift : callable
-        From `displacement_drift`.
-    lowest, highest : float
-        Corners allowed, Hz.
-    target : float
-        Largest drift of a clean displacement, dimensionless.
-
-    Returns
-    -------
-    float or None
-        Hz; None if even the highest corner leaves too much.
+    Corners are tried from the highest down in steps of a fifth until the drift, from
+    `displacement_drift`, exceeds the target; the root inside that step is found by Brent's method
+    in logarithmic frequency, to 0.1 % of the corner. None if even the highest leaves too much.
     """
     lower = highest
     if drift(lower) > target:
@@ -407,30 +343,17 @@ def clean_highpass(
     return float(lower)
 
 
-def with_corners(trace: Trace, highpass: Corner, lowpass: Corner) -> Trace:
-    """Return a copy with both corners and their reasons."""
-    for name, (frequency, reason) in (("highpass", highpass), ("lowpass", lowpass)):
-        numbers: dict[str, Value] = {name: frequency, f"{name}_source": reason}
-        trace = with_note(trace, f"{name} corner {frequency:.4g} Hz: {reason}", **numbers)
-    return trace
-
-
-def share_corners(horizontals: Iterable[Trace]) -> Stream:
+def share_corners(components: Iterable[Trace]) -> Stream:
     """
-    Return a copy whose traces all have the narrowest of their bands.
+    Return the components of an instrument whose horizontals all have the narrowest of their bands.
 
-    Parameters
-    ----------
-    horizontals : iterable of obspy Trace
-        The two horizontals of an instrument, with ``highpass``, ``lowpass`` (Hz) and their
-        ``_source`` in ``stats.per_obspy``.
-
-    Returns
-    -------
-    obspy Stream
-        With shared corners; ``own_highpass`` and ``own_lowpass`` are those before.
+    ``own_highpass`` and ``own_lowpass`` of a horizontal are its corners before; the vertical, which
+    keeps its corners, comes last.
     """
-    traces = list(horizontals)
+    traces = list[Trace]()
+    verticals = list[Trace]()
+    for trace in components:
+        (traces if is_horizontal(trace) else verticals).append(trace)
     for name, narrowest in (("highpass", max), ("lowpass", min)):
         corners = [trace.stats.per_obspy[name] for trace in traces]
         for place, own in enumerate(corners):
@@ -441,28 +364,16 @@ def share_corners(horizontals: Iterable[Trace]) -> Stream:
                 step = f"{name} {shared:.4g} Hz shared with the other horizontal"
                 out = with_note(out, step, **{f"{name}_source": "shared"})
             traces[place] = out
-    return Stream(traces)
+    return Stream(traces + verticals)
 
 
 def with_usable_periods(trace: Trace, usable: float) -> Trace:
     """
-    Return a copy with the usable periods of a record, from its corners.
+    Return a copy with the usable periods of a record, s, from its corners.
 
     Longest: usable / highpass, or the period from which on PER depends on when the baseline
-    shifted, the shorter. Shortest: 1 / (usable lowpass) or 5 sampling intervals, the longer.
-
-    Parameters
-    ----------
-    trace : obspy Trace
-        ``stats.per_obspy`` has ``highpass`` and ``lowpass``, Hz, and may have
-        ``certain_period``, s.
-    usable : float
-        Fraction of a corner's period that is usable, dimensionless.
-
-    Returns
-    -------
-    obspy Trace
-        With ``longest_period`` and ``shortest_period``, s, in ``stats.per_obspy``.
+    shifted (``certain_period``), the shorter. Shortest: 1 / (usable lowpass) or 5 sampling
+    intervals, the longer. ``usable`` is the fraction of a corner's period that is usable.
 
     References
     ----------
