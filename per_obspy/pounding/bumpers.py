@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.impact import mass_shares
-from per_obspy.pounding.single_hit import single_hit
+from per_obspy.pounding.single_hit import amplification_target, single_hit
 
 #: The stereomechanical picture (an instant impact) holds for contacts up to this share of the
 #: shortest period
@@ -76,65 +76,47 @@ def required_restitution(
     >>> print(required_restitution(0.3, 0.4, 1.0, 1.3, 1e6, 1e6, 0.5, 0.2, [1.2, 5.0]).round(4))
     [0.7212 1.    ]
     """
-    target = _checked_target(target)
-    structures = per_1, per_2, period_1, period_2, mass_1, mass_2
-    per_1, per_2, period_1, period_2, mass_1, mass_2, critical_gap, gap, target = (
-        np.broadcast_arrays(*structures, critical_gap, gap, target)
-    )
+    target = amplification_target("target", target)
+    gap, _ = np.broadcast_arrays(checks.not_negative("gap", gap), target)
 
     # State of both branches right before the impact: that of a plastic impact is the same
-    hit = single_hit(per_1, per_2, period_1, period_2, mass_1, mass_2, 0.0, critical_gap, gap)
+    radii, periods = (per_1, per_2), (period_1, period_2)
+    hit = single_hit(*radii, *periods, mass_1, mass_2, 0.0, critical_gap, gap)
     share_1, share_2, _ = mass_shares(mass_1, mass_2)
-    closing = hit.branches.velocity_1 - hit.branches.velocity_2
-    before_1 = hit.branches.displacement_1, hit.branches.velocity_1
-    before_2 = hit.branches.displacement_2, hit.branches.velocity_2
+    branches = hit.branches
+    closing = branches.velocity_1 - branches.velocity_2
+    before_1 = branches.displacement_1, branches.velocity_1
+    before_2 = branches.displacement_2, branches.velocity_2
 
     # The worst structure in the worst branch decides
-    factor_1 = _largest_factor(before_1, -share_2 * closing, period_1, target * per_1)
-    factor_2 = _largest_factor(before_2, share_1 * closing, period_2, target * per_2)
-    factor = np.min(np.minimum(factor_1, factor_2), axis=0)
-    return _restitution_of(factor, hit.status)
+    factor_1 = _largest_factor(*before_1, -share_2 * closing, period_1, target * np.asarray(per_1))
+    factor_2 = _largest_factor(*before_2, share_1 * closing, period_2, target * np.asarray(per_2))
+    factor = np.min([factor_1, factor_2], axis=(0, 1))
 
-
-def _checked_target(target: ArrayLike) -> FloatArray:
-    """Return amplifications of at least 1."""
-    target = checks.finite("target", target)
-    if np.any(target < 1.0):
-        raise ValueError(
-            "target must be at least 1 (the radius before impact is reached anyway), "
-            f"got {target.min()}"
-        )
-    return target
+    # Not below a plastic impact; any restitution without pounding
+    enough = np.where(factor >= 1.0, np.minimum(factor - 1.0, 1.0), np.nan)
+    return np.where(hit.status == "no_pounding", 1.0, enough)
 
 
 def _largest_factor(
-    before: tuple[FloatArray, FloatArray],
+    displacement: FloatArray,
+    velocity: FloatArray,
     change: FloatArray,
-    period: FloatArray,
+    period: ArrayLike,
     largest_radius: FloatArray,
 ) -> FloatArray:
     """
     Return the largest admissible q = 1 + e of one structure in both branches.
 
-    ``before`` are displacement (m) and velocity (m/s) before the impact, ``change`` is κ of the
-    notes; the factor is infinite where no impact changes the velocity.
+    Of its state before the impact (m, m/s) and ``change``, κ of the notes; infinite where no impact
+    changes the velocity.
     """
-    displacement, velocity = before
-    omega = 2.0 * np.pi / np.asarray(period, dtype=np.float64)
-
     # Velocity on the circle of the largest radius, in the direction of the change
-    room = np.asarray(largest_radius, dtype=np.float64) ** 2 - displacement**2
-    speed = omega * np.sqrt(np.maximum(room, 0.0))
+    room = np.maximum(largest_radius**2 - displacement**2, 0.0)
+    speed = 2.0 * np.pi / np.asarray(period, dtype=np.float64) * np.sqrt(room)
     still = change == 0.0
     factor = (np.copysign(speed, change) - velocity) / np.where(still, 1.0, change)
     return np.where(still, np.inf, factor)
-
-
-def _restitution_of(factor: FloatArray, status: NDArray[np.str_]) -> FloatArray:
-    """Return e = q - 1, at most 1; NaN below a plastic impact, 1 without pounding."""
-    enough = np.where(factor >= 1.0, np.minimum(factor - 1.0, 1.0), np.nan)
-    known: FloatArray = np.where(status == "no_pounding", 1.0, enough)
-    return known
 
 
 def kelvin_voigt_restitution(damping: ArrayLike, tension: bool = True) -> FloatArray:

@@ -1,6 +1,7 @@
 """Histories of two structures joined by a link, or separated by a Kelvin-Voigt or Hertz contact."""
 
 import math
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -216,20 +217,27 @@ def _history(
     """Check the arguments common to all elements, and run the kernel."""
     record = checks.record("acceleration", acceleration)
     step = checks.number("dt", dt, checks.positive)
-    structures = (structure_1, structure_2)
-    refuse_bilinear(structures)
+    refuse_bilinear(structures := (structure_1, structure_2))
 
     # Follow the free vibration after the record
     samples = record.size
     if free_vibration:
         record = closed_record(record)
-        samples = record.size + free_samples(max(structure_1.period, structure_2.period), step)
+        samples = record.size + int(free_samples(max(one.period for one in structures), step))
 
-    # Memory for displacement and velocity of both structures, the force, and five maxima
+    # Displacement and velocity of both structures, the force, and five maxima
     row = row_at_rest(structure_table(structures), np.zeros(1), np.zeros(1))
     motion, force, maxima = np.zeros((samples, 2, 2)), np.zeros(samples), np.zeros(5)
-    parts = refinement(_largest_rate(structures, element), step)
-    if not run_linked(record, step, parts, row, element, phase, MOST_TERMS, motion, force, maxima):
+    kernel = (
+        record,
+        step,
+        int(refinement(_largest_rate(structures, element), step)),
+        row,
+        element,
+        phase,
+        MOST_TERMS,
+    )
+    if not run_linked(*kernel, motion, force, maxima):
         raise RuntimeError("no end of phase changes of the link or contact within one step")
     return _linked_history(step, motion, force, maxima)
 
@@ -238,17 +246,10 @@ def _linked_history(
     dt: float, motion: FloatArray, force: FloatArray, maxima: FloatArray
 ) -> LinkedHistory:
     """Return the kernel's motion (n_time, 2, 2), force (n_time,) and maxima (5,) by name."""
-    displacement, velocity = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
-    return LinkedHistory(
-        time=dt * np.arange(len(motion), dtype=np.float64),
-        displacement=displacement,
-        velocity=velocity,
-        force=force,
-        displacement_maxima=maxima[:2],
-        closing=maxima[2],
-        parting=maxima[3],
-        force_maximum=maxima[4],
-    )
+    time = dt * np.arange(force.size, dtype=np.float64)
+    displacement, velocity = motion.T.copy()
+    closing, parting, largest = maxima[2:]
+    return LinkedHistory(time, displacement, velocity, force, maxima[:2], closing, parting, largest)
 
 
 def _largest_rate(structures: tuple[Structure, Structure], element: Element) -> float:
@@ -349,119 +350,90 @@ def hertz_damp_history(
     """
     record = checks.record("acceleration", acceleration)
     step = checks.number("dt", dt, checks.positive)
-    contact = _Contact(
-        gap=checks.number("gap", gap, checks.positive),
-        stiffness=checks.number("stiffness", stiffness, checks.positive),
-        restitution=float(checks.between("restitution", restitution, 0.0, 1.0)),
-    )
-    pair = (structure_1, structure_2)
-    refuse_bilinear(pair)
+    gap = checks.number("gap", gap, checks.positive)
+    stiffness = checks.number("stiffness", stiffness, checks.positive)
+    lost = 0.75 * (1.0 - checks.between("restitution", restitution, 0.0, 1.0) ** 2)
+    refuse_bilinear(structures := (structure_1, structure_2))
 
-    # Ground acceleration at any time, and the samples at which the motion is returned
-    closed = closed_record(record)
-    times = step * np.arange(closed.size, dtype=np.float64)
-    return _integrate(_Pair(pair, contact, step, times, closed), times[: record.size])
+    # Samples at which the motion is returned
+    times = step * np.arange(record.size, dtype=np.float64)
+    return _integrate(_HertzPair(structures, gap, stiffness, float(lost), step, times, record))
 
 
-class _Contact(NamedTuple):
-    """Gap (m), stiffness (N/m^1.5) and restitution of a Hertz-damp contact."""
+class _HertzPair(NamedTuple):
+    """
+    Two structures, their contact, and ground acceleration (m/s²) at times of interval dt (s).
 
-    gap: float
-    stiffness: float
-    restitution: float
-
-
-class _Pair(NamedTuple):
-    """Two structures, their contact, and ground acceleration (m/s²) at times of interval dt (s)."""
+    Gap (m), stiffness (N/m^1.5) and ``lost``, the factor 3 (1 - e²)/4 of the damping. An approach
+    speed of 0 means that the structures are apart.
+    """
 
     structures: tuple[Structure, Structure]
-    contact: _Contact
+    gap: float
+    stiffness: float
+    lost: float
     dt: float
     times: FloatArray
     acceleration: FloatArray
 
+    def force(self, state: FloatArray, approach: float) -> float:
+        """Return the contact force, N."""
+        overlap, rate = state[0] - state[2] - self.gap, state[1] - state[3]
+        if approach == 0.0 or overlap <= 0.0:
+            return 0.0
+        return float(self.stiffness * overlap**1.5 * (1.0 + self.lost * rate / approach))
+
     def rates(self, time: float, state: FloatArray, approach: float) -> list[float]:
         """Return the rates of change of displacement and velocity of both structures."""
-        force = _force(state, self.contact, approach)
+        force, rates = self.force(state, approach), []
         ground = float(np.interp(time, self.times, self.acceleration))
 
         # The contact pushes structure 1 back and structure 2 on
-        first, second = self.structures
-        rates_1 = _rates(first, state[0], state[1], -force, ground)
-        rates_2 = _rates(second, state[2], state[3], force, ground)
-        return [*rates_1, *rates_2]
+        for i, (one, push) in enumerate(zip(self.structures, (-force, force), strict=True)):
+            displacement, velocity = state[2 * i : 2 * i + 2]
+            own = 2.0 * one.damping * one.frequency * velocity + one.frequency**2 * displacement
+            rates += [velocity, push / one.mass - own - one.participation * ground]
+        return rates
+
+    def stretch(self, start: float, state: FloatArray, approach: float) -> Any:
+        """Integrate until the gap closes or, in contact, opens again; see ``solve_ivp``."""
+
+        def clearance(_: float, state: FloatArray) -> float:
+            return float(self.gap - state[0] + state[2])
+
+        # SciPy reads these attributes of a function
+        clearance.terminal = True  # type: ignore[attr-defined]
+        clearance.direction = 1.0 if approach else -1.0  # type: ignore[attr-defined]
+        return solve_ivp(
+            lambda time, now: self.rates(time, now, approach),
+            (start, self.times[-1]),
+            state,
+            "DOP853",
+            dense_output=True,
+            events=clearance,
+            rtol=RELATIVE_TOLERANCE,
+            atol=ABSOLUTE_TOLERANCE,
+            max_step=self.dt,
+        )
 
 
-def _force(state: FloatArray, contact: _Contact, approach: float) -> float:
-    """Return the contact force, N; an approach speed of 0 means that the structures are apart."""
-    overlap, rate = state[0] - state[2] - contact.gap, state[1] - state[3]
-    if approach == 0.0 or overlap <= 0.0:
-        return 0.0
-    damping = 0.75 * (1.0 - contact.restitution**2) * rate / approach
-    return float(contact.stiffness * overlap**1.5 * (1.0 + damping))
-
-
-def _rates(
-    structure: Structure, displacement: float, velocity: float, push: float, ground: float
-) -> tuple[float, float]:
-    """Return velocity and acceleration of one structure under a push (N) and the ground motion."""
-    omega = structure.frequency
-    own = 2.0 * structure.damping * omega * velocity + omega**2 * displacement
-    return velocity, push / structure.mass - own - structure.participation * ground
-
-
-def _integrate(pair: _Pair, times: FloatArray) -> HertzHistory:
+def _integrate(pair: _HertzPair) -> HertzHistory:
     """Integrate from contact to separation and on to the next contact."""
-    states, forces, contacts = np.zeros((4, times.size)), [0.0], 0
-    start, state, approach = 0.0, np.zeros(4), 0.0
+    times = pair.times
+    states = np.zeros((4, times.size))
+    contacts, largest, start, approach, state = 0, 0.0, 0.0, 0.0, states[:, 0]
     while start < times[-1]:
-        stretch = _until_next_event(pair, start, times[-1], state, approach)
+        stretch = pair.stretch(start, state, approach)
 
         # Store the motion at the samples of this stretch, and the force wherever it was evaluated
-        _sample(stretch, times, start, states)
-        forces += [_force(visited, pair.contact, approach) for visited in stretch.y.T]
+        reached = (times > start) & (times <= stretch.t[-1])
+        if reached.any():
+            states[:, reached] = stretch.sol(times[reached])
+        largest = max(largest, *map(pair.force, stretch.y.T, repeat(approach)))
 
         # An event of structures apart is the next contact, one in contact the separation
-        start, state = float(stretch.t[-1]), stretch.y[:, -1]
+        start, state = stretch.t[-1], stretch.y[:, -1]
         touch = stretch.status == 1 and approach == 0.0
         contacts += touch
-        approach = float(state[1] - state[3]) if touch else 0.0
-    return HertzHistory(times, states[[0, 2]], states[[1, 3]], contacts, max(forces))
-
-
-def _sample(stretch: Any, times: FloatArray, start: float, states: FloatArray) -> None:
-    """Fill in the states (4, n_samples) at the times after the start of a stretch up to its end."""
-    reached = (times > start) & (times <= stretch.t[-1])
-    if reached.any():
-        states[:, reached] = stretch.sol(times[reached])
-
-
-def _until_next_event(
-    pair: _Pair, start: float, end: float, state: FloatArray, approach: float
-) -> Any:
-    """
-    Integrate until the gap closes or, in contact (approach speed above 0), opens again.
-
-    The result is that of ``solve_ivp``.
-    """
-
-    def rates(time: float, state: FloatArray) -> list[float]:
-        return pair.rates(time, state, approach)
-
-    def clearance(_: float, state: FloatArray) -> float:
-        return float(pair.contact.gap - state[0] + state[2])
-
-    # SciPy reads these attributes of a function
-    clearance.terminal = True  # type: ignore[attr-defined]
-    clearance.direction = 1.0 if approach else -1.0  # type: ignore[attr-defined]
-    return solve_ivp(
-        rates,
-        (start, end),
-        state,
-        "DOP853",
-        dense_output=True,
-        events=clearance,
-        rtol=RELATIVE_TOLERANCE,
-        atol=ABSOLUTE_TOLERANCE,
-        max_step=pair.dt,
-    )
+        approach = touch * float(state[1] - state[3])
+    return HertzHistory(times, states[[0, 2]], states[[1, 3]], contacts, largest)

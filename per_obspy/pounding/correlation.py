@@ -7,18 +7,19 @@ building, not to a pair: the record is run through once per building, and a pair
 operations whatever the record's length.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.relative.input_moments import LAG_TILE, input_moments
 from per_obspy.kernels.relative.worst_azimuth import largest_separation
-from per_obspy.pounding.structure import checked_oscillators
+from per_obspy.pounding.kernel_tables import both_components
+from per_obspy.pounding.structure import Pairs
 from per_obspy.spectra.trace_arguments import takes_trace
+
+#: Smallest number above 0
+SMALLEST = 5e-324
 
 
 def ddc_correlation(
@@ -67,41 +68,20 @@ def ddc_correlation(
     period_2 = checks.positive("period_2", period_2)
     damping_1 = checks.fraction_of_critical("damping_1", damping_1)
     damping_2 = checks.fraction_of_critical("damping_2", damping_2)
-    ratio = period_1 / period_2
 
     # T1/T2 - T2/T1 without cancellation
     detuning = (period_1 - period_2) * (1 / period_1 + 1 / period_2)
 
     # Divided by the largest of the three, squares of small dampings cannot underflow
-    scale = np.maximum(np.maximum(damping_1, damping_2), np.abs(detuning))
-    same = scale == 0
-    scale = np.where(same, 1.0, scale)
-    above, below = _fraction(ratio, damping_1 / scale, damping_2 / scale, detuning / scale)
-    return np.where(same, 1.0, np.minimum(above / np.where(same, 1.0, below), 1.0))[()]
+    scale = np.maximum(np.maximum(damping_1, damping_2), np.maximum(abs(detuning), SMALLEST))
+    xi_1, xi_2, detuning = damping_1 / scale, damping_2 / scale, detuning / scale
 
-
-def _fraction(
-    ratio: FloatArray, damping_1: FloatArray, damping_2: FloatArray, detuning: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of equation (16), both divided by b²."""
-    product = damping_1 * damping_2
-    above = 8 * np.sqrt(product) * (damping_2 * np.sqrt(ratio) + damping_1 / np.sqrt(ratio))
-    below = detuning**2 + 4 * product * (ratio + 1 / ratio) + 4 * (damping_1**2 + damping_2**2)
-    return above, below
-
-
-class _Responses(NamedTuple):
-    """
-    One oscillator of each pair and the integrals of its response over all time, per azimuth.
-
-    ``stiffness`` is k = ω² (rad²/s²) and ``viscosity`` c = 2 ξ ω (1/s), (n_pairs, 1) each;
-    ``displacement_work`` is U = ∫ u a dt and ``velocity_work`` V = ∫ v a dt, (n_pairs, n_azimuths).
-    """
-
-    stiffness: FloatArray
-    viscosity: FloatArray
-    displacement_work: FloatArray
-    velocity_work: FloatArray
+    # Numerator and denominator of equation (16), both divided by b²
+    ratio, product = period_1 / period_2, xi_1 * xi_2
+    root = np.sqrt(ratio)
+    above = 8 * np.sqrt(product) * (xi_2 * root + xi_1 / root)
+    below = detuning**2 + 4 * (product * (ratio + 1 / ratio) + xi_1**2 + xi_2**2)
+    return np.minimum(np.divide(above, below, out=np.ones_like(below), where=below > 0), 1.0)
 
 
 def directional_correlation(
@@ -150,25 +130,10 @@ def directional_correlation(
 
     with c = c1 + c2. For white noise (U = 0, V the same for both) its normalised form is eq. (16).
     """
-    period_1 = checks.positive("period_1", period_1)
-    period_2 = checks.positive("period_2", period_2)
-    damping_1 = checks.fraction_of_critical("damping_1", damping_1)
-    damping_2 = checks.fraction_of_critical("damping_2", damping_2)
+    pairs = Pairs.of(period_1=period_1, damping_1=damping_1, period_2=period_2, damping_2=damping_2)
     angle = np.radians(checks.finite("azimuths", azimuths))
-    motion = _closed(checks.record("north", north), checks.record("east", east))
-    dt = checks.number("dt", dt, checks.positive)
-
-    # Run the record once through all oscillators: integrals of response times ground acceleration
-    periods = np.concatenate([period_1, period_2])
-    dampings = np.concatenate([damping_1, damping_2])
-    moments_1, moments_2 = np.split(_moments(*motion, dt, periods, dampings), 2)
-    first = _along(moments_1, angle, period_1, damping_1)
-    second = _along(moments_2, angle, period_2, damping_2)
-
-    # Undamped oscillators vibrate for ever: their correlation is known without integrals
-    undamped = (damping_1 * damping_2 == 0)[:, None]
-    equal = ((period_1 == period_2) & (damping_1 == damping_2))[:, None]
-    return _normalised(first, second, undamped, equal)
+    components = both_components(north, east)
+    return _correlations(components, checks.number("dt", dt, checks.positive), pairs, angle)
 
 
 def worst_azimuth(
@@ -211,126 +176,103 @@ def worst_azimuth(
     ValueError
         If an argument is out of range.
     """
-    first = checked_oscillators(1, period_1, damping_1, participation_1)
-    second = checked_oscillators(2, period_2, damping_2, participation_2)
-    pairs = np.stack([*first, *second])
-    if not pairs.size:
+    pairs = Pairs.of(
+        period_1=period_1,
+        damping_1=damping_1,
+        participation_1=participation_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        participation_2=participation_2,
+    )
+    if not pairs.gap.size:
         return np.empty(0)
     step = checks.number("dt", dt, checks.positive)
-    components = _closed(checks.record("north", north), checks.record("east", east))
 
-    # Follow two of the longest period of free vibration after the record
-    longest = float(np.max(2.0 * np.pi / pairs[[0, 3]]))
-    rest = np.zeros(int(np.ceil(2.0 * longest / step)))
-    north, east = (np.append(component, rest) for component in components)
+    # The ramp that closes the record, and two of the longest period of free vibration after it
+    rest = 1 + int(np.ceil(2.0 * pairs.period.max() / step))
+    motion = np.pad(both_components(north, east), ((0, 0), (0, rest)))
 
     # The direction of the longest vector q1 u1 - q2 u2 is the azimuth
-    vector = np.empty((2, pairs.shape[1]))
-    largest_separation(north, east, step, np.ascontiguousarray(pairs), vector)
+    vector = np.empty((2, pairs.gap.size))
+    largest_separation(*motion, step, pairs.oscillators, vector)
     azimuth: FloatArray = np.degrees(np.arctan2(vector[1], vector[0])) % 360.0
     return azimuth
 
 
-def _closed(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the two components with the ramp to zero that closes a record."""
-    if north.size != east.size:
-        raise ValueError(f"east must have the {north.size} samples of north, got {east.size}")
-    return np.append(north, 0.0), np.append(east, 0.0)
+def _correlations(components: FloatArray, dt: float, pairs: Pairs, angle: FloatArray) -> FloatArray:
+    """
+    Return the correlations of pairs along angles (rad), (n_pairs, n_angles).
+
+    By the formula in the notes of :func:`directional_correlation`.
+    """
+    work, power = _input_work(components, dt, pairs, angle)
+    omega, damping = pairs.frequency[..., np.newaxis], pairs.damping[..., np.newaxis]
+
+    # Undamped oscillators vibrate for ever: their correlation is known without integrals
+    undamped = damping[0] * damping[1] == 0
+    equal = (omega[0] == omega[1]) & (damping[0] == damping[1])
+
+    # k, c, and c U + V; of one structure the formula is -(c U + V)/(c k)
+    stiffness, viscosity = omega**2, np.where(undamped, 1.0, 2.0 * damping * omega)
+    own = viscosity * work + power
+    variances = np.where(undamped, 1.0, -own / (viscosity * stiffness))
+    if np.any(variances <= 0):
+        raise ValueError("north and east have no motion along an azimuth: there is no correlation")
+    scale = np.sqrt(variances[0]) * np.sqrt(variances[1])
+
+    # Equal oscillators move as one: exactly 1 in spite of rounding
+    ratio = _covariance(stiffness, viscosity, work, own) / scale
+    return np.where(equal, 1.0, np.where(undamped, 0.0, np.clip(ratio, -1.0, 1.0)))
 
 
-def _moments(
-    north: FloatArray, east: FloatArray, dt: float, period: FloatArray, damping: FloatArray
+def _covariance(
+    stiffness: FloatArray, viscosity: FloatArray, work: FloatArray, own: FloatArray
 ) -> FloatArray:
-    """Return the moments (n, 2, 3) of the kernel."""
-    omega, ratio = 2.0 * np.pi / period, np.ascontiguousarray(damping)
-    order = np.argsort(omega * ratio, kind="stable")
-    moments = np.empty((omega.size, 2, 3))
-    lagged, firsts = _sample_products(north, east)
-    input_moments(lagged, firsts, dt, omega, ratio, order, moments)
-    return moments
+    """Return ∫ u1 u2 dt from k, c, U and c U + V of both structures (first axis)."""
+    (k_1, k_2), (c_1, c_2) = stiffness, viscosity
+    above = (k_1 - k_2) * (work[0] - work[1]) - (c_1 + c_2) * own.sum(axis=0)
+    covariance: FloatArray = above / ((k_1 - k_2) ** 2 + (c_1 + c_2) * (c_1 * k_2 + c_2 * k_1))
+    return covariance
+
+
+def _input_work(
+    components: FloatArray, dt: float, pairs: Pairs, angle: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return U = ∫ u a dt and V = ∫ v a dt of both structures, (2, n_pairs, n_angles) each."""
+    # Run the record once through all oscillators
+    frequency, damping = pairs.frequency.ravel(), pairs.damping.ravel()
+    order = np.argsort(frequency * damping, kind="stable")
+    moments = np.empty((order.size, 2, 3))
+    input_moments(*_sample_products(*components), dt, frequency, damping, order, moments)
+
+    # Moments of north with north, of north with east, and of east with east
+    cosine, sine = np.cos(angle), np.sin(angle)
+    north, cross, east = moments.reshape(2, -1, 2, 3).transpose(3, 2, 0, 1)[..., np.newaxis]
+    work, power = cosine**2 * north + cosine * sine * cross + sine**2 * east
+    return work, power
 
 
 def _sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return sums of products of two samples, and products with the first sample, by their distance.
 
-    Both are (3, n): north with north, north with east and east with north, east with east.
+    Both are (3, n): north with north, north with east and east with north, east with east; the
+    record is closed by a ramp to zero.
     """
-    count = north.size
+    count = north.size + 1
     padded = fft.next_fast_len(2 * count, real=True)
+    lagged, firsts = np.zeros((2, 3, -(-count // LAG_TILE) * LAG_TILE + 2))
 
     # Sums of products at every distance are the inverse transform of the (cross) power spectrum
     spectra = fft.rfft([north, east], padded)
-    power_north = np.abs(spectra[0]) ** 2
     power_both = 2.0 * (spectra[0].conj() * spectra[1]).real
-    power_east = np.abs(spectra[1]) ** 2
-    powers = np.stack([power_north, power_both, power_east])
-    lagged, firsts = np.zeros((2, 3, -(-count // LAG_TILE) * LAG_TILE + 2))
+    powers = np.stack([np.abs(spectra[0]) ** 2, power_both, np.abs(spectra[1]) ** 2])
     lagged[:, :count] = fft.irfft(powers, padded)[:, :count]
 
     # Products of the first sample with the sample at each distance
-    firsts[0, :count] = north[0] * north
-    firsts[1, :count] = north[0] * east + east[0] * north
-    firsts[2, :count] = east[0] * east
+    products = north[0] * north, north[0] * east + east[0] * north, east[0] * east
+    firsts[:, : north.size] = products
     return lagged, firsts
-
-
-def _along(
-    moments: FloatArray, angle: FloatArray, period: FloatArray, damping: FloatArray
-) -> _Responses:
-    """Return oscillators with the integrals of their response along the angles."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    north, cross, east = np.moveaxis(moments, -1, 0)[..., None]  # each (n_pairs, 2, 1)
-    along: FloatArray = (
-        cosine[:, None] ** 2 * north + (cosine * sine)[:, None] * cross + sine[:, None] ** 2 * east
-    )
-    stiffness = (2.0 * np.pi / period[:, None]) ** 2
-    viscosity = 2.0 * damping[:, None] * stiffness**0.5
-    return _Responses(stiffness, viscosity, along[:, 0], along[:, 1])
-
-
-def _normalised(
-    first: _Responses, second: _Responses, undamped: NDArray[np.bool_], equal: NDArray[np.bool_]
-) -> FloatArray:
-    """Return the covariance over the root of both variances; 1 or 0 for undamped oscillators."""
-    variance_1, variance_2 = _covariance(first, first), _covariance(second, second)
-    if np.any((variance_1 <= 0) & ~undamped) or np.any((variance_2 <= 0) & ~undamped):
-        raise ValueError("north and east have no motion along an azimuth: there is no correlation")
-    root_1 = np.sqrt(np.where(undamped, 1.0, variance_1))
-    root_2 = np.sqrt(np.where(undamped, 1.0, variance_2))
-    scale = root_1 * root_2
-
-    # Equal oscillators move as one: exactly 1 in spite of rounding
-    covariance = np.where(equal, scale, _covariance(first, second))
-    bounded = np.clip(covariance / scale, -1.0, 1.0)
-    correlation: FloatArray = np.where(undamped, equal, bounded)
-    return correlation
-
-
-def _covariance(first: _Responses, second: _Responses) -> FloatArray:
-    """
-    Return the integral of u1 u2 over all time, 0 if undamped.
-
-    The formula is that in the notes of :func:`directional_correlation`.
-    """
-    detuning = first.stiffness - second.stiffness
-    viscosity = first.viscosity + second.viscosity
-
-    # c1 U1 + c2 U2 + V1 + V2
-    input_work = (
-        first.viscosity * first.displacement_work
-        + second.viscosity * second.displacement_work
-        + first.velocity_work
-        + second.velocity_work
-    )
-    difference = first.displacement_work - second.displacement_work
-    above = detuning * difference - viscosity * input_work
-
-    # (k1 - k2)² + c (c1 k2 + c2 k1)
-    coupling = first.viscosity * second.stiffness + second.viscosity * first.stiffness
-    below = detuning**2 + viscosity * coupling
-    covariance: FloatArray = np.divide(above, below, out=np.zeros_like(above), where=below > 0)
-    return covariance
 
 
 @takes_trace
@@ -378,21 +320,12 @@ def record_correlation(
     >>> print(record_correlation([0.0, 1.0, 0.0], 0.01, 1.0, 0.05, [1.0, 1.2], 0.05).round(3))
     [1.   0.23]
     """
-    acceleration = checks.record("acceleration", acceleration)
-    if not acceleration.any():
+    record = checks.record("acceleration", acceleration)
+    if not record.any():
         raise ValueError("acceleration is 0 everywhere: there is no correlation")
-    pairs = np.broadcast_arrays(
-        checks.positive("period_1", period_1),
-        checks.fraction_of_critical("damping_1", damping_1),
-        checks.positive("period_2", period_2),
-        checks.fraction_of_critical("damping_2", damping_2),
-    )
-    period_1, damping_1, period_2, damping_2 = (array.ravel() for array in pairs)
+    pairs = Pairs.of(period_1=period_1, damping_1=damping_1, period_2=period_2, damping_2=damping_2)
 
     # One component: the record is that along north, and so is the axis of every pair
-    east = np.zeros_like(acceleration)
-    correlation = directional_correlation(
-        acceleration, east, dt, period_1, damping_1, period_2, damping_2, azimuths=[[0.0]]
-    )
-    shaped: FloatArray = correlation[:, 0].reshape(pairs[0].shape)
-    return shaped
+    components = np.stack([record, np.zeros_like(record)])
+    step = checks.number("dt", dt, checks.positive)
+    return _correlations(components, step, pairs, np.zeros((1, 1)))[:, 0].reshape(pairs.shape)

@@ -17,15 +17,8 @@ class EquivalentLinear(NamedTuple):
     damping: float
 
 
-class UnverifiedEquivalentLinear(NamedTuple):
+class UnverifiedEquivalentLinear(EquivalentLinear):
     """:class:`EquivalentLinear` from unverified coefficients: the source text was not at hand."""
-
-    period: float
-    damping: float
-
-
-#: ductility, hardening -> factor of the period, damping to add
-Formula = Callable[[float, float], tuple[float, float]]
 
 
 def _secant(ductility: float, hardening: float) -> float:
@@ -45,12 +38,6 @@ def _gulkan_sozen(ductility: float, hardening: float) -> tuple[float, float]:
     return _secant(ductility, hardening), 0.2 * (1.0 - 1.0 / math.sqrt(ductility))
 
 
-def iwan(ductility: Ductility, hardening: float) -> tuple[Ductility, Ductility]:
-    """Return period factor and damping to add (Iwan 1980), of arrays of ductilities from 1 too."""
-    del hardening  # fitted for one hardening
-    return 1.0 + 0.121 * (ductility - 1.0) ** 0.939, 0.0587 * (ductility - 1.0) ** 0.371
-
-
 def _kowalsky(ductility: float, hardening: float) -> tuple[float, float]:
     """Return period factor and damping of Takeda's loops (Kowalsky 1994)."""
     root = math.sqrt(ductility)
@@ -58,9 +45,9 @@ def _kowalsky(ductility: float, hardening: float) -> tuple[float, float]:
     return _secant(ductility, hardening), loop / math.pi
 
 
-def _fema_440(ductility: float, hardening: float) -> tuple[float, float]:
-    """Return period factor and damping of FEMA 440, in three ranges of ductility."""
-    del hardening  # the form for any hysteresis
+def _fema_440(ductility: float, _: float) -> tuple[float, float]:
+    """Return period factor and damping of FEMA 440 for any hysteresis, in three ranges."""
+    # Ductilities below 4, up to 6.5, and above
     over = ductility - 1.0
     if ductility < 4.0:
         return 1.0 + 0.20 * over**2 - 0.038 * over**3, (4.9 * over**2 - 1.1 * over**3) / 100.0
@@ -70,28 +57,31 @@ def _fema_440(ductility: float, hardening: float) -> tuple[float, float]:
     return factor, 19.0 * (0.64 * over - 1.0) / (0.64 * over) ** 2 * factor**2 / 100.0
 
 
-def _jeng(ductility: float, hardening: float) -> tuple[float, float]:
-    """Return the unverified period factor and damping of Jeng, Kasai & Maison (1992)."""
-    del hardening
-    return 1.0 + 0.09 * (ductility - 1.0), 0.084 * (ductility - 1.0) ** 1.3
+def _powers(
+    longer: float, exponent: float, damping: float, damping_exponent: float
+) -> Callable[[Ductility, float], tuple[Ductility, Ductility]]:
+    """Return a formula by powers of the ductility above 1, fitted for one hardening."""
+
+    def formula(ductility: Ductility, _: float) -> tuple[Ductility, Ductility]:
+        over = ductility - 1.0
+        return 1.0 + longer * over**exponent, damping * over**damping_exponent
+
+    return formula
 
 
-def _kasai(ductility: float, hardening: float) -> tuple[float, float]:
-    """Return the unverified period factor and damping of Kasai, Jagiasi & Jeng (1996)."""
-    del hardening
-    return 1.0 + 0.18 * (ductility - 1.0), 0.16 * (ductility - 1.0) ** 0.9
+#: Period factor and damping to add (Iwan 1980), of arrays of ductilities from 1 too
+iwan = _powers(0.121, 0.939, 0.0587, 0.371)
 
-
-#: Methods by their authors. ``gulkan_sozen`` includes 2 % of viscous damping, so the structure's
-#: is not added.
-METHODS: dict[str, Formula] = {
+#: Formulas by their authors: of ductility and hardening, the factor of the period and the damping
+#: to add. ``gulkan_sozen`` includes 2 % of viscous damping, so the structure's is not added.
+METHODS: dict[str, Callable[[float, float], tuple[float, float]]] = {
     "rosenblueth_herrera": _rosenblueth_herrera,
     "gulkan_sozen": _gulkan_sozen,
     "iwan": iwan,
     "kowalsky": _kowalsky,
     "fema_440": _fema_440,
-    "jeng_unverified": _jeng,
-    "kasai_unverified": _kasai,
+    "jeng_unverified": _powers(0.09, 1.0, 0.084, 1.3),
+    "kasai_unverified": _powers(0.18, 1.0, 0.16, 0.9),
 }
 OWN_DAMPING = {"gulkan_sozen": 0.02}
 

@@ -1,132 +1,65 @@
 """Tables of structures for the kernels, and pairs against one record in blocks of 32."""
 
-import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
-from per_obspy.kernels.pounding_events import motion
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, count_impacts
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES
 from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
-from per_obspy.pounding.structure import Structure
+from per_obspy.pounding.structure import Pairs, Structure
 from per_obspy.threads import map_in_threads
+
+IntArray = NDArray[np.int64]
 
 #: Free vibration after the record is followed for this many of the longest period at most.
 PERIODS_AFTER_RECORD = 20.0
 
+#: Bouncing ends in contact once the separation speed is below this share of the largest ground
+#: velocity, and a bounce that lasts less than this share of a sampling interval does.
+SPEED_SHARE, SHORTEST_BOUNCE = 1e-11, 1e-3
 
-def structure_table(structures: Sequence[Structure]) -> FloatArray:
-    """
-    Return the kernels' table of structures.
+#: Bouncing of a pair ends in contact after this many impacts in one sampling interval. With 25,
+#: radii of pairs with a restitution of 0.95 were off by 1e-7; from 100 on they no longer change.
+BOUNCES_OF_PAIRS = 400
 
-    Parameters
-    ----------
-    structures : sequence of Structure
-        From left to right.
 
-    Returns
-    -------
-    (n_structures, 6) ndarray
-        Half damping rate ``xi omega`` (1/s), squared frequency (rad²/s²), hardening, yield
-        displacement (m), participation, mass (kg).
-    """
-    rows = []
-    for structure in structures:
-        omega = structure.frequency
-        spring = structure.damping * omega, omega**2, structure.hardening
-        rows.append(
-            (*spring, structure.yield_displacement, structure.participation, structure.mass)
+def ground_motion(acceleration: ArrayLike) -> FloatArray:
+    """Return checked north and east components, (2, n_samples), m/s²."""
+    record = checks.finite("acceleration", acceleration)
+    if record.ndim != 2 or record.shape[0] != 2 or record.size == 0:
+        raise ValueError(
+            f"acceleration must be north and east (2, n_samples) with azimuth, "
+            f"got the shape {record.shape}"
         )
-    return np.array(rows)
+    return np.ascontiguousarray(record)
 
 
-def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> FloatArray:
-    """
-    Return the rows of structures at rest; structures without a gap start in contact.
-
-    Parameters
-    ----------
-    table : (..., n_structures, 6) ndarray
-        As from `structure_table`.
-    gaps : (..., n_structures - 1) ndarray
-        In m.
-    restitution : (..., n_structures - 1) ndarray
-        Dimensionless.
-
-    Returns
-    -------
-    (..., n_structures, ROW_COLUMNS) ndarray
-        For the kernels; when bounces end is still to be set.
-    """
-    row = np.zeros((*table.shape[:-1], motion.ROW_COLUMNS))
-    row[..., :6] = table
-    row[..., :-1, motion.GAP] = gaps
-    row[..., :-1, motion.RESTITUTION] = restitution
-    row[..., :-1, motion.IN_CONTACT] = gaps <= 0.0
-    return row
-
-
-def refinement(largest_frequency: float, dt: float) -> int:
-    """
-    Return the number of segments per sampling interval for which Taylor series are short.
-
-    Parameters
-    ----------
-    largest_frequency : float
-        Undamped circular frequency, rad/s.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    int
-        A power of two; 1 where the shortest period is above about 9 dt.
-    """
-    doublings = max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_ANGLE)))
-    return 1 << doublings
-
-
-def free_samples(longest_period: float, dt: float) -> int:
-    """
-    Return the sampling intervals for which free vibration is followed at most.
-
-    Parameters
-    ----------
-    longest_period : float
-        Of the structures, s.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    int
-        A multiple of the steps between two checks of whether a pair is settled; at least one such
-        round.
-    """
-    rounds = int(PERIODS_AFTER_RECORD * longest_period / (SETTLING_STEPS * dt))
-    return SETTLING_STEPS * max(1, rounds)
+def both_components(north: ArrayLike, east: ArrayLike) -> FloatArray:
+    """Return checked components of equal length, (2, n_samples), m/s²."""
+    components = checks.record("north", north), checks.record("east", east)
+    if components[0].size != components[1].size:
+        raise ValueError(
+            f"north and east must be equally long, got {components[0].size} and "
+            f"{components[1].size} samples"
+        )
+    return np.stack(components)
 
 
 def closed_record(acceleration: FloatArray) -> FloatArray:
     """
     Return a record that ends at zero: otherwise a sample of zero is appended (a ramp of dt).
 
-    Parameters
-    ----------
-    acceleration : (..., n_samples) ndarray
-        In m/s².
-
-    Returns
-    -------
-    (..., n_samples or n_samples + 1) ndarray
-        In m/s².
+    Both are (..., n_samples), m/s².
     """
     if not acceleration[..., -1].any():
         return acceleration
@@ -134,23 +67,97 @@ def closed_record(acceleration: FloatArray) -> FloatArray:
 
 
 def largest_ground_velocity(acceleration: FloatArray, dt: float) -> float:
-    """
-    Return the largest velocity of the ground, as the scale against which speeds are small.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) ndarray
-        In m/s².
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    float
-        In m/s; the ground starts at rest.
-    """
+    """Return the largest velocity (m/s) of the ground, as the scale of speeds; at first at rest."""
     steps = 0.5 * dt * (acceleration[1:] + acceleration[:-1])
     return float(np.abs(np.cumsum(steps)).max(initial=0.0))
+
+
+def structure_table(structures: Sequence[Structure]) -> FloatArray:
+    """Return the kernels' table of structures from left to right, see `kernel_table`."""
+    values = attrgetter(
+        "damping", "frequency", "hardening", "yield_displacement", "participation", "mass"
+    )
+    return kernel_table(*np.array([values(one) for one in structures]).T)
+
+
+def kernel_table(
+    damping: FloatArray,
+    frequency: FloatArray,
+    hardening: FloatArray,
+    yield_displacement: FloatArray,
+    drive: FloatArray,
+    mass: FloatArray,
+) -> FloatArray:
+    """
+    Return the kernels' table of structures, (..., 6), from arrays of one shape.
+
+    Half damping rate ``xi omega`` (1/s), squared frequency (rad²/s²), hardening, yield displacement
+    (m), ``drive`` by the ground (the participation), mass (kg).
+    """
+    spring = damping * frequency, frequency**2, hardening, yield_displacement
+    return np.stack([*spring, drive, mass], axis=-1)
+
+
+def pair_table(pairs: Pairs) -> FloatArray:
+    """Return the kernels' table of the structures of pairs, (n_pairs, 2, 6)."""
+    walls = np.flatnonzero(np.isinf(pairs.mass).all(axis=0))
+    if walls.size:
+        raise ValueError(
+            f"mass_1 and mass_2 must not both be infinite, got inf at index {walls[0]}"
+        )
+    springs = pairs.damping, pairs.frequency, pairs.hardening, pairs.yield_displacement
+    return kernel_table(*springs, pairs.participation, pairs.mass).swapaxes(0, 1)
+
+
+def refuse_pressed_walls(mass: FloatArray, gap: FloatArray, row: IntArray, named: str) -> None:
+    """
+    Refuse two walls (infinite masses) of a row with an interface or without a gap between them.
+
+    ``row`` is the number of the row of each structure, ``gap`` (m) that after it.
+    """
+    for left, right in pairwise(np.flatnonzero(np.isinf(mass))):
+        is_pressed = right == left + 1 or not gap[left:right].any()
+        if row[left] == row[right] and is_pressed:
+            raise ValueError(
+                f"mass of {named} {left} and {right} is infinite, with no room to move between them"
+            )
+
+
+def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> FloatArray:
+    """
+    Return the kernels' rows of structures at rest; structures without a gap start in contact.
+
+    Of a table (..., n_structures, 6) and of gaps (m) and restitutions (..., n_structures - 1);
+    when bounces end is still to be set.
+    """
+    row = np.zeros((*table.shape[:-1], columns.ROW_COLUMNS))
+    row[..., :6] = table
+    row[..., :-1, columns.GAP] = gaps
+    row[..., :-1, columns.RESTITUTION] = restitution
+    row[..., :-1, columns.IN_CONTACT] = gaps <= 0.0
+    return row
+
+
+def refinement(largest_frequency: ArrayLike, dt: float) -> IntArray:
+    """
+    Return the segments per sampling interval (dt, s) for which Taylor series are short.
+
+    Powers of two, for circular frequencies in rad/s; 1 where the shortest period is above about 9
+    dt.
+    """
+    angle = np.asarray(largest_frequency) * dt / columns.LARGEST_ANGLE
+    return np.left_shift(1, np.maximum(np.ceil(np.log2(angle)), 0.0).astype(np.int64))
+
+
+def free_samples(longest_period: ArrayLike, dt: float) -> IntArray:
+    """
+    Return the sampling intervals (dt, s) for which free vibration is followed at most.
+
+    Multiples of the steps between two checks of whether a pair is settled, at least one such round,
+    for periods in s.
+    """
+    rounds = PERIODS_AFTER_RECORD * np.asarray(longest_period) / (SETTLING_STEPS * dt)
+    return SETTLING_STEPS * np.clip(rounds, 1.0, 1e12).astype(np.int64)
 
 
 #: Bytes of a line of the processor's cache.
@@ -158,74 +165,6 @@ CACHE_LINE = 64
 
 #: Impacts of a pair for which there is room at first. Pages that stay unused take no memory.
 FIRST_ROOM = 4096
-
-#: Check of each argument of a pair; those of one structure end with its number.
-CHECKS: dict[str, Callable[[str, ArrayLike], FloatArray]] = {
-    "period": checks.positive,
-    "damping": checks.fraction_of_critical,
-    "mass": checks.positive_or_infinite,
-    "gap": checks.not_negative,
-    "restitution": lambda name, values: checks.between(name, values, 0.0, 1.0),
-    "participation": checks.not_negative,
-    "azimuth": checks.finite,
-    "yield_displacement": checks.positive_or_infinite,
-    "hardening": checks.fraction_of_critical,
-}
-
-
-def pair_fields(**arguments: ArrayLike) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
-    """
-    Return the arguments of all pairs by name, checked and flat, and their broadcast shape.
-
-    Parameters
-    ----------
-    **arguments : array_like
-        By the names of ``CHECKS``, for example ``period_1``, ``damping_1`` and ``gap``.
-
-    Returns
-    -------
-    fields : dict of str to (n_pairs,) ndarray
-        In the units of the arguments.
-    shape : tuple of int
-        Of the results.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
-    checked = {}
-    for name, values in arguments.items():
-        checked[name] = CHECKS[name.rstrip("_12")](name, values)
-
-    # One value per pair
-    shapes = [values.shape for values in checked.values()]
-    shape = np.broadcast_shapes(*shapes)
-    flat = {name: np.broadcast_to(values, shape).ravel() for name, values in checked.items()}
-    return flat, shape
-
-
-def pair_table(fields: dict[str, FloatArray]) -> FloatArray:
-    """Return the kernels' table of structures, (n_pairs, 2, 6)."""
-    table = np.empty((fields["gap"].size, 2, 6))
-    for structure in (1, 2):
-        # Half damping rate, squared frequency, backbone, drive and mass
-        columns = table[:, structure - 1]
-        frequency = 2.0 * np.pi / fields[f"period_{structure}"]
-        columns[:, 0] = fields[f"damping_{structure}"] * frequency
-        columns[:, 1] = frequency**2
-        columns[:, 2] = fields[f"hardening_{structure}"]
-        columns[:, 3] = fields[f"yield_displacement_{structure}"]
-        columns[:, 4] = fields[f"participation_{structure}"]
-        columns[:, 5] = fields[f"mass_{structure}"]
-
-    # Two walls cannot move towards each other
-    walls = np.flatnonzero(np.isinf(table[:, :, 5]).all(axis=1))
-    if walls.size:
-        raise ValueError(
-            f"mass_1 and mass_2 must not both be infinite, got inf at index {walls[0]}"
-        )
-    return table
 
 
 def aligned(size: int) -> FloatArray:
@@ -239,30 +178,11 @@ def aligned(size: int) -> FloatArray:
     return numbers[first : first + size]
 
 
-def refinements(table: FloatArray, dt: float) -> NDArray[np.int64]:
-    """Return the number of steps per sampling interval for each pair of a table."""
-    frequencies = np.sqrt(table[:, :, 1].max(axis=1))
-    return np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
-
-
-def free_vibration_steps(fields: dict[str, FloatArray], dt: float) -> NDArray[np.int64]:
-    """Return the sampling intervals of free vibration at most, for each pair."""
-    longest = np.maximum(fields["period_1"], fields["period_2"])
-    return np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
-
-
 def records_in_steps(components: FloatArray, parts: ArrayLike, dt: float) -> dict[int, Record]:
     """
-    Return a record for the kernels of histories, by its steps per sampling interval.
+    Return a record (2, n_samples) for the kernels of histories, by its steps per sampling interval.
 
-    Parameters
-    ----------
-    components : (2, n_samples) ndarray
-        North and east acceleration, m/s².
-    parts : array_like of int
-        Numbers of steps into which each sampling interval is cut.
-    dt : float
-        Sampling interval, s.
+    One for each of the numbers ``parts`` into which sampling intervals (dt, s) are cut.
     """
     # integrals of the size, by the trapezoidal rule: an upper bound
     size = np.abs(components)
@@ -273,7 +193,7 @@ def records_in_steps(components: FloatArray, parts: ArrayLike, dt: float) -> dic
     return {number: Record(components, number, dt / number, sizes) for number in numbers}
 
 
-def pair_blocks(parts: NDArray[np.int64], rows: FloatArray) -> list[NDArray[np.int64]]:
+def pair_blocks(parts: IntArray, rows: FloatArray) -> list[IntArray]:
     """
     Return the pairs of each block: at most 32, of equal refinement.
 
@@ -295,12 +215,8 @@ class KeptLogs:
     Logs of impacts that are used by one block after another, in each thread others.
 
     The system clears new memory where it is first written, which takes longer than the impacts
-    that are written there.
-
-    Parameters
-    ----------
-    rows, impacts : int
-        Number of logs, and of lines of each, for which memory is kept; more are new each time.
+    that are written there. Memory is kept for a number of logs (``rows``) and of lines of each
+    (``impacts``); more are new each time.
     """
 
     def __init__(self, rows: int, impacts: int) -> None:
@@ -325,6 +241,39 @@ class KeptLogs:
         if logs.base is not None:
             self._free.append(logs.base)
 
+    def fill(self, rows: int, run: Callable[[FloatArray], int]) -> FloatArray:
+        """Return logs that a run has filled; it returns the most impacts that a log has to hold."""
+        room = self.impacts
+        while (impacts := run(logs := self.room(rows, room))) > room:
+            self.keep(logs)
+            room = impacts
+        return logs
+
+
+def run_pairs(
+    kernel: Callable[..., bool],
+    lane_rows: int,
+    components: FloatArray,
+    dt: float,
+    pairs: Pairs,
+    free_vibration: bool,
+) -> tuple[FloatArray, IntArray]:
+    """Return the rows of pairs after a record, see `run_blocks`, and their impacts that count."""
+    table = pair_table(pairs)
+    parts = refinement(pairs.frequency.max(axis=0, initial=0.0), dt)
+    rows = row_at_rest(table, pairs.gap[:, np.newaxis], pairs.restitution[:, np.newaxis])
+
+    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
+    velocity = SPEED_SHARE * sum(largest_ground_velocity(one, dt) for one in components)
+    rows[:, 0, columns.STICKING_SPEED] = velocity * pairs.participation.max(axis=0)
+    rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    rows[:, 0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS
+
+    # Run the record and, where it is asked for, the free vibration after it
+    free_steps = free_samples(pairs.period.max(axis=0), dt) * free_vibration
+    steps = parts, free_steps, np.radians(pairs.azimuth)
+    return rows, run_blocks(kernel, lane_rows, components, dt, rows, *steps)
+
 
 def run_blocks(
     kernel: Callable[..., bool],
@@ -332,10 +281,10 @@ def run_blocks(
     components: FloatArray,
     dt: float,
     rows: FloatArray,
-    parts: NDArray[np.int64],
-    free_steps: NDArray[np.int64],
+    parts: IntArray,
+    free_steps: IntArray,
     azimuth: FloatArray,
-) -> NDArray[np.int64]:
+) -> IntArray:
     """
     Carry all pairs through a record and the free vibration after it, in blocks on all processors.
 
@@ -351,10 +300,8 @@ def run_blocks(
         Sampling interval, s.
     rows : (n_pairs, 2, ROW_COLUMNS) ndarray
         Of the pairs at rest; then at the end.
-    parts : (n_pairs,) ndarray of int
-        Steps of a sampling interval.
-    free_steps : (n_pairs,) ndarray of int
-        Sampling intervals of free vibration at most.
+    parts, free_steps : (n_pairs,) ndarray of int
+        Steps of a sampling interval, and sampling intervals of free vibration at most.
     azimuth : (n_pairs,) ndarray
         Of the axis from 1 to 2, rad.
 
@@ -371,54 +318,49 @@ def run_blocks(
     counts = np.zeros(len(rows), dtype=np.int64)
     records = records_in_steps(components, parts, dt)
     kept = KeptLogs(PAIR_LANES, FIRST_ROOM)
+    cosine, sine = np.cos(azimuth), np.sin(azimuth)
 
-    def run(block: NDArray[np.int64]) -> None:
+    def run(block: IntArray) -> None:
         """Run one block of pairs, filled up with repetitions that have no free vibration."""
-        filled, steps = np.resize(block, PAIR_LANES), int(parts[block[0]])
-
-        # Their free vibration and direction
+        filled, record = np.resize(block, PAIR_LANES), records[int(parts[block[0]])]
         free = np.where(np.arange(PAIR_LANES) < block.size, free_steps[filled], -1)
-        direction = np.cos(azimuth[filled]), np.sin(azimuth[filled])
-        record = records[steps]
-
         # Results of the block, without the repetitions
-        others = *direction, free
-        found = _run_logged(kernel, lane_rows, record, rows[filled], others, kept)
-        if found is None:
-            raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
-        rows[block], counts[block] = (result[: block.size] for result in found)
+        others = cosine[filled], sine[filled], free
+        own, found = _run_block(kernel, lane_rows, record, rows[filled], others, kept)
+        rows[block], counts[block] = own[: block.size], found[: block.size]
 
+    # Blocks do not depend on each other
     map_in_threads(run, pair_blocks(parts, rows))
     return counts
 
 
-def _run_logged(
+def _run_block(
     kernel: Callable[..., bool],
     lane_rows: int,
     record: Record,
-    rows: FloatArray,
-    others: tuple[FloatArray, FloatArray, NDArray[np.int64]],
+    start: FloatArray,
+    others: tuple[NDArray[Any], ...],
     kept: KeptLogs,
-) -> tuple[FloatArray, NDArray[np.int64]] | None:
-    """Return rows at the end and impacts that count of one block; None without end of events."""
-    room = kept.impacts
-    # Grow the logs until all impacts of every pair have room
-    while True:
-        logs = kept.room(PAIR_LANES, room)
-        # The kernel changes its rows and the steps of free vibration
-        own, (cosine, sine, free) = rows.copy(), others
+) -> tuple[FloatArray, IntArray]:
+    """Return rows of one block at the end, and impacts that count."""
+    own, (cosine, sine, free) = start.copy(), others
+
+    def fill(logs: FloatArray) -> int:
+        """Run the block from rest; the kernel changes rows and steps of free vibration."""
+        own[:] = start
         memory = *_working_memory(lane_rows), own, logs
         if not kernel(record, *memory, cosine, sine, free.copy()):
-            return None
-        impacts = int(own[:, 0, columns.IMPACTS].max())
-        counts = count_impacts(own, logs) if impacts <= room else None
-        kept.keep(logs)
-        if counts is not None:
-            return own, counts
-        room = impacts
+            raise RuntimeError("no end of events in a step of a pair")
+        return int(own[:, 0, columns.IMPACTS].max())
+
+    # Slower and rarer impacts are the chatter of structures that are pressed together
+    logs = kept.fill(PAIR_LANES, fill)
+    counts = count_impacts(own, logs)
+    kept.keep(logs)
+    return own, counts
 
 
-def _working_memory(lane_rows: int) -> tuple[FloatArray | NDArray[np.int64], ...]:
+def _working_memory(lane_rows: int) -> tuple[FloatArray | IntArray, ...]:
     """Return the memory of one block: lanes, flags, ground of two tiles, pairs, waiting tiles."""
     lanes = aligned(lane_rows * PAIR_LANES)
     flags = aligned(PAIR_LANES).view(np.int64)

@@ -11,15 +11,18 @@ d; the elastoplastic part carries y = u - d, and the rate
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from itertools import compress
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import quad
-from scipy.special import erfc, ndtr, owens_t
+from scipy.special import erfc, owens_t
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
+from per_obspy.pounding.kernel_tables import both_components
 from per_obspy.pounding.stationary_ground import (
     StochasticGround,
     correlation,
@@ -46,44 +49,98 @@ class LinearizedEstimate(NamedTuple):
     converged: bool
 
 
-def failed() -> LinearizedEstimate:
-    """Return an estimate without numbers."""
-    missing = np.full(2, np.nan)
-    return LinearizedEstimate(
-        float("nan"), missing, missing.copy(), missing.copy(), converged=False
-    )
-
-
-#: Share of each change that an iteration makes.
-RELAXATION = 0.5
-
-#: Relative change of frequency and damping between two iterations that ends them.
-TOLERANCE = 1e-12
-
-#: Largest number of iterations.
-ITERATIONS = 1000
+#: Share of each change that an iteration makes, relative change that ends the iterations, and their
+#: largest number: of frequency and damping (Krylov-Bogoliubov), of 1 - c and k (Gauss-3).
+KRYLOV_STEPS, GAUSS_STEPS = (0.5, 1e-12, 1000), (0.3, 1e-11, 3000)
 
 #: Exponent from which on an exponential is negligible: exp(-46) is 1e-20.
 NEGLIGIBLE = 46.0
 
+NORMAL = NormalDist()
+
+#: Standard deviations beyond which yielding has a probability below 1e-15.
+ELASTIC = 8.0
+
+
+def _fixed_point(
+    values: FloatArray,
+    fitted: Callable[[FloatArray], FloatArray],
+    steps: tuple[float, float, int],
+) -> FloatArray | None:
+    """Return the values that a function returns unchanged, by relaxed iteration; None without."""
+    share, tolerance, iterations = steps
+    for _ in range(iterations):
+        change = fitted(values) - values
+        if np.all(np.abs(change) <= tolerance * values):
+            return values
+        values = values + share * change
+    return None
+
+
+def _estimate(
+    periods: ArrayLike, dampings: ArrayLike, covariance: FloatArray, second: int
+) -> LinearizedEstimate:
+    """Return an estimate; ``second`` is the state of the displacement of structure 2."""
+    sigma = np.sqrt(covariance[[0, second], [0, second]])
+    rho = correlation(covariance, 0, second)
+    return LinearizedEstimate(rho, np.array(periods), np.array(dampings), sigma, converged=True)
+
+
+def _failed() -> LinearizedEstimate:
+    """Return an estimate without numbers."""
+    period, damping, sigma = np.full((3, 2), np.nan)
+    return LinearizedEstimate(math.nan, period, damping, sigma, converged=False)
+
 
 def krylov_bogoliubov(
-    structures: tuple[Structure, Structure], ground: StochasticGround
-) -> LinearizedEstimate:
-    """Return the estimate in which each yield displacement is compared with the response to it."""
-    limit_1, limit_2 = (structure.yield_displacement for structure in structures)
-    return _iterate(structures, ground, lambda sigma: [limit_1 / sigma[0], limit_2 / sigma[1]])
-
-
-def prescribed_ductility(
     structures: tuple[Structure, Structure],
-    ductilities: tuple[float, float],
-    peak_factor: float,
     ground: StochasticGround,
+    levels_of: Callable[[FloatArray], FloatArray],
 ) -> LinearizedEstimate:
-    """Return the estimate in which each peak response is a multiple of the yield displacement."""
-    levels = [peak_factor / ductility if ductility > 1.0 else math.inf for ductility in ductilities]
-    return _iterate(structures, ground, lambda _: levels)
+    """
+    Return the estimate that averages over Rayleigh amplitudes.
+
+    ``levels_of`` returns the yield displacements over the standard deviations of displacement, of
+    these deviations (m).
+    """
+    # At first elastic
+    start = np.array([(one.frequency, one.damping) for one in structures])
+    oscillators = _fixed_point(
+        start, lambda values: _fitted(structures, ground, levels_of, values), KRYLOV_STEPS
+    )
+    if oscillators is None:
+        return _failed()
+    frequency, damping = oscillators.T
+    return _estimate(2.0 * np.pi / frequency, damping, _response(ground, oscillators), 2)
+
+
+def _response(ground: StochasticGround, oscillators: FloatArray) -> FloatArray:
+    """Return the covariance of displacement and velocity of oscillator 1, then of 2."""
+    frequency, damping = oscillators.T
+    periods = 2.0 * np.pi / frequency
+    systems = [linear_oscillator(*one) for one in zip(periods, damping, strict=True)]
+    return stationary_covariance(ground, *systems)
+
+
+def _fitted(
+    structures: tuple[Structure, Structure],
+    ground: StochasticGround,
+    levels_of: Callable[[FloatArray], FloatArray],
+    oscillators: FloatArray,
+) -> FloatArray:
+    """Return frequency and damping (columns) that fit structures at the response of oscillators."""
+    sigma, rate = np.sqrt(np.diag(_response(ground, oscillators))[:4]).reshape(2, 2).T
+    fitted = []
+    for one, level, inverse in zip(structures, levels_of(sigma), sigma / rate, strict=True):
+        softened = 1.0 - one.hardening
+        stiffness = one.hardening + softened * equivalent_stiffness(level)
+        frequency = one.frequency * math.sqrt(stiffness)
+
+        # Viscous damping and that of the loops, per mass
+        loops = softened * one.frequency**2 * equivalent_viscosity(level) * inverse
+        viscosity = 2.0 * one.damping * one.frequency + loops
+        fitted.append((frequency, viscosity / (2.0 * frequency)))
+    return np.array(fitted)
 
 
 def equivalent_stiffness(level: float) -> float:
@@ -120,140 +177,73 @@ def equivalent_viscosity(level: float) -> float:
     return float(math.sqrt(2.0 / math.pi) * level * erfc(level / math.sqrt(2.0)))
 
 
-def _iterate(
-    structures: tuple[Structure, Structure],
-    ground: StochasticGround,
-    levels_of: Callable[[FloatArray], Sequence[float]],
-) -> LinearizedEstimate:
-    """Alternate between the covariance of two oscillators and the oscillators that fit it."""
-    # Circular frequency and damping of both, at first elastic
-    oscillators = np.array([[structure.frequency, structure.damping] for structure in structures])
-    for _ in range(ITERATIONS):
-        periods, dampings = 2.0 * np.pi / oscillators[:, 0], oscillators[:, 1]
-        covariance = _covariance(ground, periods, dampings)
-        sigma = np.sqrt(covariance[[0, 2], [0, 2]])
-        rates = np.sqrt(covariance[[1, 3], [1, 3]]) / sigma
-
-        # Frequency and damping that fit the bilinear structures at this response
-        fitted = zip(structures, levels_of(sigma), rates, strict=True)
-        change = np.array([_equivalent(*arguments) for arguments in fitted]) - oscillators
-        if np.all(np.abs(change) < TOLERANCE * oscillators):
-            rho = correlation(covariance, 0, 2)
-            return LinearizedEstimate(rho, periods, dampings, sigma, converged=True)
-        oscillators += RELAXATION * change
-    return failed()
-
-
-def _covariance(ground: StochasticGround, periods: FloatArray, dampings: FloatArray) -> FloatArray:
-    """Return the covariance of displacement and velocity of oscillator 1, then of 2."""
-    first = linear_oscillator(periods[0], dampings[0])
-    second = linear_oscillator(periods[1], dampings[1])
-    return stationary_covariance(ground, first, second)
-
-
-def _equivalent(structure: Structure, level: float, rate: float) -> tuple[float, float]:
-    """
-    Return circular frequency (rad/s) and damping of the fitting oscillator.
-
-    ``rate`` is the standard deviation of velocity over that of displacement, 1/s.
-    """
-    softened = 1.0 - structure.hardening
-    omega = structure.frequency
-    stiffness = structure.hardening + softened * equivalent_stiffness(level)
-    fitted = omega * math.sqrt(stiffness)
-
-    # Viscous damping and that of the loops, per mass
-    loops = softened * omega**2 * equivalent_viscosity(level) / rate
-    viscosity = 2.0 * structure.damping * omega + loops
-    return fitted, viscosity / (2.0 * fitted)
-
-
-#: Share of each change that an iteration makes.
-GAUSS_RELAXATION = 0.3
-
-#: Relative change of 1 - c and k between two iterations that ends them.
-GAUSS_TOLERANCE = 1e-11
-
-#: Largest number of iterations.
-GAUSS_ITERATIONS = 3000
-
-#: Standard deviations beyond which yielding has a probability below 1e-15.
-ELASTIC = 8.0
-
-
 def gauss_3(
     structures: tuple[Structure, Structure], ground: StochasticGround
 ) -> LinearizedEstimate:
     """
-    Return the estimate of the correlation of two bilinear structures.
+    Return the estimate of three Gaussian states.
 
     Without hardening a yielding structure drifts for ever and the estimate does not converge.
     """
-    # Structures whose elastic response reaches their yield displacement
-    responses = _elastic_responses(structures, ground)
-    yielding = [_yields(*pair) for pair in zip(structures, responses, strict=True)]
-    if any(_drifts(*pair) for pair in zip(structures, yielding, strict=True)):
-        return failed()
+    # Structures that can be expected to yield
+    owns, is_plastic = _elastic_response(structures, ground)
+    if 0.0 in [one.hardening for one in compress(structures, is_plastic)]:
+        return _failed()
 
-    # Alternate between the covariance of linear systems and the systems that fit it
-    slips = _slips(structures, responses, yielding)
-    for _ in range(GAUSS_ITERATIONS):
-        systems = [_system(*item) for item in zip(structures, slips, yielding, strict=True)]
-        covariance = stationary_covariance(ground, *systems)
-        responses = [_response(own) for own in _own(covariance, systems)]
-        change = _slips(structures, responses, yielding) - slips
-        if np.all(np.abs(change) <= GAUSS_TOLERANCE * slips):
-            return _estimate(structures, covariance, systems)
-        slips += GAUSS_RELAXATION * change
-    return failed()
+    def response(slips: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+        """Return covariance and systems of both structures at plastic rates (rows)."""
+        systems = [_system(*one) for one in zip(structures, slips, is_plastic, strict=True)]
+        return stationary_covariance(ground, *systems), systems
 
+    def fitted(owns: list[FloatArray]) -> FloatArray:
+        """Return the plastic rates that fit covariances of the states of each structure."""
+        return np.array([_slip(*one) for one in zip(structures, owns, is_plastic, strict=True)])
 
-class _Response(NamedTuple):
-    """Standard deviations of y (m) and v (m/s), and their correlation."""
-
-    sigma_force: float
-    sigma_velocity: float
-    coherence: float
+    # Iterate between the covariance of linear systems and the systems that fit it
+    slips = _fixed_point(
+        fitted(owns), lambda values: fitted(_of_each(*response(values))), GAUSS_STEPS
+    )
+    return _failed() if slips is None else _fitting_oscillators(structures, *response(slips))
 
 
-def _elastic_responses(
+def _fitting_oscillators(
+    structures: tuple[Structure, Structure], covariance: FloatArray, systems: list[FloatArray]
+) -> LinearizedEstimate:
+    """Return the estimate with the oscillators whose forces fit those of the structures best."""
+    periods, dampings = [], []
+    for one, own in zip(structures, _of_each(covariance, systems), strict=True):
+        force, _ = _force(own)
+        stiffness, softened = one.frequency**2, 1.0 - one.hardening
+
+        # In-phase part of the force over displacement, out-of-phase part over velocity
+        omega = math.sqrt(stiffness * (one.hardening + softened * force[0] / own[0, 0]))
+        loops = softened * stiffness * force[1] / own[1, 1]
+        viscosity = 2.0 * one.damping * one.frequency + loops
+        periods.append(2.0 * math.pi / omega)
+        dampings.append(viscosity / (2.0 * omega))
+    return _estimate(periods, dampings, covariance, len(systems[0]))
+
+
+def _elastic_response(
     structures: tuple[Structure, Structure], ground: StochasticGround
-) -> list[_Response]:
-    """Return the responses of both structures while they stay elastic."""
-    systems = [linear_oscillator(structure.period, structure.damping) for structure in structures]
-    variances = np.diag(stationary_covariance(ground, *systems))
-    responses = []
-    for displacement in (0, 2):
-        sigma = math.sqrt(variances[displacement])
-        sigma_velocity = math.sqrt(variances[displacement + 1])
-        responses.append(_Response(sigma, sigma_velocity, 0.0))
-    return responses
+) -> tuple[list[FloatArray], list[bool]]:
+    """Return covariances of elastic structures, and whether they reach their yield displacement."""
+    systems = [linear_oscillator(one.period, one.damping) for one in structures]
+    owns = _of_each(stationary_covariance(ground, *systems), systems)
+    both = zip(structures, owns, strict=True)
+    return owns, [one.yield_displacement < ELASTIC * math.sqrt(own[0, 0]) for one, own in both]
 
 
-def _yields(structure: Structure, response: _Response) -> bool:
-    """Return True if a structure can be expected to yield."""
-    return structure.yield_displacement < ELASTIC * response.sigma_force
+def _of_each(covariance: FloatArray, systems: list[FloatArray]) -> list[FloatArray]:
+    """Return the covariance of the states of each structure."""
+    second, end = len(systems[0]), len(systems[0]) + len(systems[1])
+    return [covariance[:second, :second], covariance[second:end, second:end]]
 
 
-def _drifts(structure: Structure, yields: bool) -> bool:
-    """Return True if a structure yields without hardening."""
-    return yields and structure.hardening == 0.0
-
-
-def _slips(
-    structures: tuple[Structure, Structure], responses: list[_Response], yielding: list[bool]
-) -> FloatArray:
-    """Return the plastic rates of both structures (rows); none where a structure stays elastic."""
-    rows = []
-    for structure, response, yields in zip(structures, responses, yielding, strict=True):
-        rows.append(slip(structure.yield_displacement, *response) if yields else (0.0, 0.0))
-    return np.array(rows)
-
-
-def _system(structure: Structure, slips: FloatArray, yields: bool) -> FloatArray:
+def _system(structure: Structure, slips: FloatArray, is_plastic: bool) -> FloatArray:
     """Return the state matrix of u, v and, where the structure yields, d."""
     linear = linear_oscillator(structure.period, structure.damping)
-    if not yields:
+    if not is_plastic:
         return linear
 
     # d' = (1 - c) v - k (u - d), and d relieves the elastoplastic spring
@@ -265,55 +255,19 @@ def _system(structure: Structure, slips: FloatArray, yields: bool) -> FloatArray
     return system
 
 
-def _elastoplastic(covariance: FloatArray) -> FloatArray:
-    """Return the covariances of y = u - d with u, v (and d) of one structure."""
-    force: FloatArray = covariance[0] - covariance[2] if len(covariance) == 3 else covariance[0]
-    return force
+def _force(own: FloatArray) -> tuple[FloatArray, float]:
+    """Return the covariances of y = u - d (u if elastic) with the states, and its variance."""
+    combined = np.array([1.0, 0.0, -1.0])[: len(own)]
+    return combined @ own, float(combined @ own @ combined)
 
 
-def _response(covariance: FloatArray) -> _Response:
-    """Return the response of one structure from the covariance of its states."""
-    force = _elastoplastic(covariance)
-    sigma_force = math.sqrt(force[0] - force[2] if len(covariance) == 3 else force[0])
-    sigma_velocity = math.sqrt(covariance[1, 1])
-    return _Response(sigma_force, sigma_velocity, force[1] / (sigma_force * sigma_velocity))
-
-
-def _own(covariance: FloatArray, systems: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the covariance of the states of each structure."""
-    second, end = len(systems[0]), len(systems[0]) + len(systems[1])
-    return covariance[:second, :second], covariance[second:end, second:end]
-
-
-def _estimate(
-    structures: tuple[Structure, Structure], covariance: FloatArray, systems: list[FloatArray]
-) -> LinearizedEstimate:
-    """Return the correlation, and the oscillators whose forces fit those of the structures best."""
-    own_1, own_2 = _own(covariance, systems)
-    period_1, damping_1 = _oscillator(structures[0], own_1)
-    period_2, damping_2 = _oscillator(structures[1], own_2)
-
-    # Displacements are the first states of both structures
-    second = len(systems[0])
-    return LinearizedEstimate(
-        correlation=correlation(covariance, 0, second),
-        period=np.array([period_1, period_2]),
-        damping=np.array([damping_1, damping_2]),
-        sigma=np.sqrt(covariance[[0, second], [0, second]]),
-        converged=True,
-    )
-
-
-def _oscillator(structure: Structure, own: FloatArray) -> tuple[float, float]:
-    """Return period (s) and damping of the oscillator that fits one structure's force best."""
-    force = _elastoplastic(own)
-    stiffness, softened = structure.frequency**2, 1.0 - structure.hardening
-
-    # In-phase part of the force over displacement, out-of-phase part over velocity
-    omega = math.sqrt(stiffness * (structure.hardening + softened * force[0] / own[0, 0]))
-    loops = softened * stiffness * force[1] / own[1, 1]
-    viscosity = 2.0 * structure.damping * structure.frequency + loops
-    return 2.0 * math.pi / omega, viscosity / (2.0 * omega)
+def _slip(structure: Structure, own: FloatArray, is_plastic: bool) -> tuple[float, float]:
+    """Return the plastic rates of one structure from the covariance of its states, 0 if elastic."""
+    if not is_plastic:
+        return 0.0, 0.0
+    force, variance = _force(own)
+    sigma, speed = math.sqrt(variance), math.sqrt(own[1, 1])
+    return slip(structure.yield_displacement, sigma, speed, force[1] / (sigma * speed))
 
 
 def slip(
@@ -333,13 +287,8 @@ def slip(
 
     # E[v⁺ | y = uy]: v is normal there
     mean, spread = coherence * sigma_velocity * h, sigma_velocity * side
-    forward = mean * ndtr(mean / spread) + spread * _normal(mean / spread)
-    return float(2.0 * plastic), float(2.0 * _normal(h) / sigma_force * forward)
-
-
-def _normal(x: float) -> float:
-    """Return the standard normal density."""
-    return math.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
+    forward = mean * NORMAL.cdf(mean / spread) + spread * NORMAL.pdf(mean / spread)
+    return float(2.0 * plastic), float(2.0 * NORMAL.pdf(h) / sigma_force * forward)
 
 
 #: Vanmarcke bandwidth below which a ground motion counts as narrow: a threshold of this package,
@@ -402,14 +351,19 @@ def linearized_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.kernel_tables import both_components
+    from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0), Structure(1.2, 0.05, 1.0)
     >>> linear = linearized_correlation(*pair, WhiteNoise(0.01))
     >>> print(round(linear.recommended, 6), linear.gauss_3.converged)
     0.229814 True
     """
-    structures = _damped(structure_1), _damped(structure_2)
-    first, second = krylov_bogoliubov(structures, ground), gauss_3(structures, ground)
+    structures = _damped(structure_1, structure_2)
+    limits = np.array([one.yield_displacement for one in structures])
+
+    # The smaller of both where the ground motion is narrow
+    first = krylov_bogoliubov(structures, ground, lambda sigma: limits / sigma)
+    second = gauss_3(structures, ground)
     recommended = second.correlation if second.converged else first.correlation
     if second.converged and bandwidth(ground) < narrow:
         recommended = min(first.correlation, second.correlation)
@@ -460,19 +414,20 @@ def ductility_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.kernel_tables import both_components
+    from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0, hardening=0.05), Structure(1.2, 0.05, 1.0, hardening=0.05)
     >>> print(ductility_correlation(*pair, 4.0, 4.0, WhiteNoise(0.01)).correlation > 0.5)
     True
     """
-    ductilities = (
-        checks.number("ductility_1", ductility_1, checks.positive),
-        checks.number("ductility_2", ductility_2, checks.positive),
-    )
+    ductility_1 = checks.number("ductility_1", ductility_1, checks.positive)
+    ductility_2 = checks.number("ductility_2", ductility_2, checks.positive)
     peak_factor = checks.number("peak_factor", peak_factor, checks.positive)
-    return prescribed_ductility(
-        (_damped(structure_1), _damped(structure_2)), ductilities, peak_factor, ground
-    )
+
+    # Yield displacement over standard deviation of displacement
+    levels = [peak_factor / one if one > 1.0 else math.inf for one in (ductility_1, ductility_2)]
+    structures = _damped(structure_1, structure_2)
+    return krylov_bogoliubov(structures, ground, lambda _: np.array(levels))
 
 
 def davenport_peak_factor(frequency: float, duration: float) -> float:
@@ -557,13 +512,12 @@ def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
     ValueError
         If a component is no record or the interval is not positive.
     """
-    motion = np.stack([checks.record("north", north), checks.record("east", east)])
+    motion = both_components(north, east)
     power: FloatArray = (np.abs(np.fft.rfft(motion)) ** 2).sum(axis=0)
     step = checks.number("dt", dt, checks.positive)
 
     # Only frequencies of ground motion count
-    hertz = np.fft.rfftfreq(motion.shape[1], step).astype(np.float64)
-    frequency: FloatArray = 2.0 * np.pi * hertz
+    frequency = 2.0 * np.pi * np.fft.rfftfreq(motion.shape[1], step).astype(np.float64)
     inside = frequency <= LARGEST_FREQUENCY
     return _bandwidth(frequency[inside], power[inside]) if power.any() else 1.0
 
@@ -578,7 +532,8 @@ def _bandwidth(frequency: FloatArray, density: FloatArray) -> float:
     return float(np.sqrt(max(1.0 - moments[1] ** 2 / (moments[0] * moments[2]), 0.0)))
 
 
-def _damped(structure: Structure) -> Structure:
-    """Return a structure whose damping is above 0."""
-    checks.number("damping", structure.damping, checks.positive)
-    return structure
+def _damped(first: Structure, second: Structure) -> tuple[Structure, Structure]:
+    """Return structures whose dampings are above 0."""
+    for structure in (first, second):
+        checks.number("damping", structure.damping, checks.positive)
+    return first, second

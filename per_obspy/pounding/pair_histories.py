@@ -11,25 +11,9 @@ from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
-from per_obspy.pounding.kernel_tables import (
-    closed_record,
-    free_vibration_steps,
-    largest_ground_velocity,
-    pair_fields,
-    pair_table,
-    refinements,
-    row_at_rest,
-    run_blocks,
-)
-from per_obspy.pounding.row_history import SPEED_SHARE
+from per_obspy.pounding.kernel_tables import closed_record, ground_motion, run_pairs
+from per_obspy.pounding.structure import Pairs
 from per_obspy.spectra.trace_arguments import takes_trace
-
-#: A bounce that lasts less than this share of a sampling interval ends in contact.
-SHORTEST_BOUNCE = 1e-3
-
-#: Bouncing ends in contact after this many impacts in one sampling interval. With 25, radii of
-#: pairs with a restitution of 0.95 were off by 1e-7; from 100 on they no longer change.
-BOUNCES_OF_PAIRS = 400
 
 
 class PoundingMaxima(NamedTuple):
@@ -83,7 +67,7 @@ def pounding_histories(
 
     The same physics as `pounding_history`, many pairs at once on all processors; the result of a
     pair does not depend on the others. Bouncing ends in contact a little earlier: when a bounce
-    would last less than a thousandth of a sampling interval, or after 25 impacts in one.
+    would last less than a thousandth of a sampling interval, or after 400 impacts in one.
 
     Parameters
     ----------
@@ -137,9 +121,8 @@ def pounding_histories(
     >>> bool(maxima.impacts[0] > 0), bool(maxima.impacts[1] > 0)
     (True, False)
     """
-    # Check every argument, and bring all to one value per pair
     step = checks.number("dt", dt, checks.positive)
-    fields, shape = pair_fields(
+    pairs = Pairs.of(
         period_1=period_1,
         damping_1=damping_1,
         mass_1=mass_1,
@@ -156,49 +139,21 @@ def pounding_histories(
         yield_displacement_2=yield_displacement_2,
         hardening_2=hardening_2,
     )
-    components = _components(acceleration, azimuth is not None)
+
+    # A single component is the north one, at azimuth 0
+    if azimuth is None:
+        record = checks.record("acceleration", acceleration)
+        components = np.stack([record, np.zeros_like(record)])
+    else:
+        components = ground_motion(acceleration)
     if free_vibration:
         components = closed_record(components)
 
     # Rows of the kernels hold the squares of the largest radii
-    rows, impacts = _run(components, step, fields, free_vibration)
+    rows, impacts = run_pairs(run_block, LANE_ROWS, components, step, pairs, free_vibration)
     return PoundingMaxima(
-        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
-        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
-        impacts=impacts.reshape(shape),
-        impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
+        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
+        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
+        impacts=impacts.reshape(pairs.shape),
+        impact_velocity=rows[:, 0, columns.APPROACH].reshape(pairs.shape),
     )
-
-
-def _components(acceleration: ArrayLike, has_azimuth: bool) -> FloatArray:
-    """Return north and east component; a single component is the north one, at azimuth 0."""
-    record = checks.finite("acceleration", acceleration)
-    if has_azimuth and (record.ndim != 2 or record.shape[0] != 2 or record.size == 0):
-        raise ValueError(
-            f"acceleration must be north and east (2, n_samples) with azimuth, got {record.shape}"
-        )
-    if has_azimuth:
-        return np.ascontiguousarray(record)
-    single = checks.record("acceleration", record)
-    return np.stack([single, np.zeros_like(single)])
-
-
-def _run(
-    components: FloatArray, dt: float, fields: dict[str, FloatArray], free_vibration: bool
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return the rows of all pairs at the end and their impacts, from blocks on all processors."""
-    table = pair_table(fields)
-    parts = refinements(table, dt)
-    rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
-
-    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
-    ground_velocity = sum(largest_ground_velocity(component, dt) for component in components)
-    rows[:, 0, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
-    rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
-    rows[:, 0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS
-
-    # Run the record and, where it is asked for, the free vibration after it
-    free_steps = free_vibration_steps(fields, dt) * free_vibration
-    angles = np.radians(fields["azimuth"])
-    motion = components, dt, rows, parts, free_steps, angles
-    return rows, run_blocks(run_block, LANE_ROWS, *motion)

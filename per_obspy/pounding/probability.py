@@ -1,7 +1,5 @@
 """Probability of pounding by lognormal radii, and how the dispersions of radii and gaps combine."""
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.special import ndtr
 
@@ -95,9 +93,8 @@ def combined_dispersion_correlation(
 
     # sum(rho_k b_1k b_2k)/(b_1 b_2), 0 where a radius is certain
     product = combined_dispersion(first) * combined_dispersion(second)
-    ratio = covariance / np.where(product > 0, product, 1.0)
-    correlation: FloatArray = np.where(product > 0, ratio, 0.0)
-    return np.minimum(np.maximum(correlation, -1.0), 1.0)
+    ratio = np.where(product > 0, covariance, 0.0) / np.where(product > 0, product, 1.0)
+    return np.clip(ratio, -1.0, 1.0)
 
 
 def lognormal_dispersion(mean: ArrayLike, standard_deviation: ArrayLike) -> FloatArray:
@@ -261,131 +258,72 @@ def pounding_probability(
     >>> print(pounding_probability(0.2, 0.1, 0.0, 0.05**0.5, 0.4, 0.4, 1.0).round(9))
     0.5
     """
-    # Medians, dispersions of the radii, and the dispersion of all else
-    per_1, per_2 = checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)
-    correlation = checks.between("correlation", correlation, -1.0, 1.0)
-    gap = checks.not_negative("gap", gap)
-    beta_1 = checks.not_negative("dispersion_1", dispersion_1)
-    beta_2 = checks.not_negative("dispersion_2", dispersion_2)
-    shared = checks.between("dispersion_correlation", dispersion_correlation, -1.0, 1.0)
-    rest = np.hypot(
-        checks.not_negative("model_dispersion", model_dispersion),
-        checks.not_negative("gap_dispersion", gap_dispersion),
+    # All that is known of each pair, and the dispersion of model and gap together
+    values = (
+        checks.not_negative("per_1", per_1),
+        checks.not_negative("per_2", per_2),
+        checks.between("correlation", correlation, -1.0, 1.0),
+        checks.not_negative("gap", gap),
+        checks.not_negative("dispersion_1", dispersion_1),
+        checks.not_negative("dispersion_2", dispersion_2),
+        checks.between("dispersion_correlation", dispersion_correlation, -1.0, 1.0),
+        np.hypot(
+            checks.not_negative("model_dispersion", model_dispersion),
+            checks.not_negative("gap_dispersion", gap_dispersion),
+        ),
     )
-    broadcast = np.broadcast_arrays(per_1, per_2, correlation, gap, beta_1, beta_2, shared, rest)
-    probability = _probabilities(_Pairs(*(array.ravel() for array in broadcast)))
-    shaped: FloatArray = probability.reshape(broadcast[0].shape)
-    return shaped
+    broadcast = np.broadcast_arrays(*values)
+    flat = (array.ravel() for array in broadcast)
+    return _probabilities(*flat).reshape(broadcast[0].shape)
 
 
-class _Pairs(NamedTuple):
-    """
-    Median radii and gap (m), correlation and dispersions of pairs, (n_pairs,) each.
+def _probabilities(
+    per_1: FloatArray,
+    per_2: FloatArray,
+    correlation: FloatArray,
+    gap: FloatArray,
+    beta_1: FloatArray,
+    beta_2: FloatArray,
+    shared: FloatArray,
+    rest: FloatArray,
+) -> FloatArray:
+    """Return the probability of each pair; ``rest`` is the dispersion of model and gap."""
+    # Dispersion of ln(r2/r1), without cancellation; of one radius alone there is no ratio
+    spread = np.hypot(beta_1 - beta_2, np.sqrt(2.0 * (1.0 - shared) * beta_1 * beta_2))
+    spread = np.where((per_1 > 0) & (per_2 > 0), spread, 0.0)
 
-    ``beta_1`` and ``beta_2`` are the dispersions of the radii, ``shared`` their correlation, and
-    ``rest`` the dispersion of model and gap.
-    """
+    # A certain ratio of the radii: the critical gap is lognormal, or certain as well
+    demand = critical_gap(per_1, per_2, correlation)
+    beta = np.hypot(np.where(per_1 > 0, beta_1, np.where(per_2 > 0, beta_2, 0.0)), rest)
+    probability = (demand > gap).astype(np.float64)
+    some = np.flatnonzero((beta > 0) & (demand > 0) & (gap > 0))
+    probability[some] = ndtr(np.log(demand[some] / gap[some]) / beta[some])
 
-    per_1: FloatArray
-    per_2: FloatArray
-    correlation: FloatArray
-    gap: FloatArray
-    beta_1: FloatArray
-    beta_2: FloatArray
-    shared: FloatArray
-    rest: FloatArray
-
-    def ratio_dispersion(self) -> FloatArray:
-        """Return the standard deviation of ln(r2/r1), without cancellation."""
-        independent = np.sqrt(2.0 * (1.0 - self.shared) * self.beta_1 * self.beta_2)
-        spread: FloatArray = np.hypot(self.beta_1 - self.beta_2, independent)
-        return spread
-
-
-def _probabilities(pairs: _Pairs) -> FloatArray:
-    """Return the probability of each pair, by the integral only where it is needed."""
-    # Without uncertainty pounding is certain or impossible
-    demand = critical_gap(pairs.per_1, pairs.per_2, pairs.correlation)
-    probability = (demand > pairs.gap).astype(np.float64)
-    _replace_lognormal(probability, pairs, demand)
-
-    # Uncertain ratio of the radii: the integral of the notes
-    moving = (pairs.per_1 > 0) & (pairs.per_2 > 0)
-    uncertain = moving & (pairs.gap > 0) & (pairs.ratio_dispersion() > 0)
-    if uncertain.any():
-        probability[uncertain] = _integrals(_Pairs(*(values[uncertain] for values in pairs)))
+    # An uncertain ratio: the integral of the notes
+    some = np.flatnonzero((spread > 0) & (gap > 0))
+    if some.size:
+        numbers = per_1, per_2, correlation, gap, beta_1, beta_2, shared, rest, spread
+        probability[some] = _integrals(*(values[some] for values in numbers))
     return probability
 
 
-def _replace_lognormal(probability: FloatArray, pairs: _Pairs, demand: FloatArray) -> None:
-    """Fill in the pairs whose ratio of radii is certain: then the critical gap is lognormal."""
-    alone = (pairs.per_1 == 0) | (pairs.per_2 == 0)
-    beta_alone = np.where(pairs.per_2 == 0, 0.0, pairs.beta_2)
-    beta = np.where(pairs.per_1 == 0, beta_alone, pairs.beta_1)
-    spread = np.hypot(beta, pairs.rest)
-
-    # Φ(ln(demand/gap)/spread), where all three are known
-    certain_ratio = alone | (pairs.ratio_dispersion() == 0)
-    lognormal = certain_ratio & (spread > 0) & (demand > 0) & (pairs.gap > 0)
-    margin = np.log(demand[lognormal] / pairs.gap[lognormal])
-    probability[lognormal] = ndtr(margin / spread[lognormal])
-
-
-def _integrals(pairs: _Pairs) -> FloatArray:
+def _integrals(
+    per_1: FloatArray,
+    per_2: FloatArray,
+    correlation: FloatArray,
+    gap: FloatArray,
+    beta_1: FloatArray,
+    beta_2: FloatArray,
+    shared: FloatArray,
+    rest: FloatArray,
+    spread: FloatArray,
+) -> FloatArray:
     """Return the integral of :func:`pounding_probability` for uncertain ratios of the radii."""
-    spread = pairs.ratio_dispersion()
-    beta_1, beta_2, shared = pairs.beta_1, pairs.beta_2, pairs.shared
-
     # Mean of ln r1 given D falls or rises with this slope; its deviation given D
     slope = beta_1 * (shared * beta_2 - beta_1) / spread**2
     left = beta_1 * beta_2 * np.sqrt((1.0 - shared) * (1.0 + shared)) / spread
-    median_ratio = np.log(pairs.per_2 / pairs.per_1)
-    margin = np.log(pairs.per_1 / pairs.gap)
-    deviation = np.hypot(left, pairs.rest)
-    parameters = np.stack([median_ratio, spread, margin, slope, deviation, pairs.correlation])
-    out = np.empty(pairs.per_1.size)
-    probabilities(parameters, out)
+    margin, deviation = np.log(per_1 / gap), np.hypot(left, rest)
+    terms = np.log(per_2 / per_1), spread, margin, slope, deviation, correlation
+    out = np.empty(gap.size)
+    probabilities(np.stack(terms), out)
     return out
-
-
-def demand_probability(demand: ArrayLike, gap: ArrayLike, dispersion: ArrayLike) -> FloatArray:
-    """
-    Compute the probability that a lognormal demand exceeds the gap.
-
-    The demand is for example the exact relative displacement of a record.
-
-    Parameters
-    ----------
-    demand : array_like
-        Median demand, m.
-    gap : array_like
-        Median gap, m.
-    dispersion : array_like
-        Standard deviation of the logarithm of demand over gap (all sources together),
-        dimensionless.
-
-    Returns
-    -------
-    probability : ndarray
-        Broadcast shape, from 0 to 1; without dispersion 1 where the demand exceeds the gap, else 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative.
-
-    Examples
-    --------
-    >>> print(demand_probability(0.1, [0.1, 0.0], 0.3))
-    [0.5 1. ]
-    """
-    demand, gap = checks.not_negative("demand", demand), checks.not_negative("gap", gap)
-    spread = checks.not_negative("dispersion", dispersion)
-    demand, gap, spread = np.broadcast_arrays(demand, gap, spread)
-
-    # Φ(ln(demand/gap)/dispersion), where all three are above 0
-    known = (demand > 0) & (gap > 0) & (spread > 0)
-    ratio = np.where(known, demand, 1.0) / np.where(known, gap, 1.0)
-    margin = np.log(ratio) / np.where(known, spread, 1.0)
-    probability: FloatArray = np.where(known, ndtr(margin), demand > gap)
-    return probability

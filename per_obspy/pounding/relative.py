@@ -15,15 +15,12 @@ from per_obspy.kernels.pounding_lanes.run_without_contact import (
 )
 from per_obspy.kernels.relative.relative_maxima import relative_maxima
 from per_obspy.pounding.kernel_tables import (
+    both_components,
     closed_record,
-    free_vibration_steps,
-    pair_fields,
-    pair_table,
-    refinements,
-    row_at_rest,
-    run_blocks,
+    ground_motion,
+    run_pairs,
 )
-from per_obspy.pounding.structure import checked_oscillators
+from per_obspy.pounding.structure import Pairs
 from per_obspy.spectra.trace_arguments import takes_trace
 
 #: Largest remainder of a motion that is not computed, over 0.4 % of its bound: of critical gaps a
@@ -111,13 +108,11 @@ def relative_displacement(
     >>> print(gap.largest[0], gap.largest[1] > 0)
     0.0 True
     """
-    acceleration = checks.record("acceleration", acceleration)
-    east = np.zeros_like(acceleration)
+    record = checks.record("acceleration", acceleration)
     structures = period_1, damping_1, period_2, damping_2
-    participations = participation_1, participation_2
-    return directional_relative_displacement(
-        acceleration, east, dt, *structures, 0.0, *participations
-    )
+    shares = participation_1, participation_2
+    east = np.zeros_like(record)
+    return directional_relative_displacement(record, east, dt, *structures, 0.0, *shares)
 
 
 def directional_relative_displacement(
@@ -164,10 +159,16 @@ def directional_relative_displacement(
     --------
     relative_displacement : One component, and notes on exactness.
     """
-    oscillators = period_1, damping_1, period_2, damping_2
-    shares = participation_1, participation_2
-    largest = _directional_maxima(north, east, dt, *oscillators, azimuth, *shares)
-    one_before_two, two_before_one, _ = largest
+    pairs = Pairs.of(
+        period_1=period_1,
+        damping_1=damping_1,
+        participation_1=participation_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        participation_2=participation_2,
+        azimuth=azimuth,
+    )
+    one_before_two, two_before_one, _ = _maxima(north, east, dt, pairs, FORGOTTEN, both_sides=True)
     either = np.maximum(one_before_two, two_before_one)
     return RelativeDisplacement(one_before_two, two_before_one, either)
 
@@ -204,63 +205,43 @@ def approach(
     ValueError
         If an argument is out of range or the components differ in length.
     """
-    oscillators = period_1, damping_1, period_2, damping_2
-    shares = participation_1, participation_2
-    largest = _directional_maxima(north, east, dt, *oscillators, azimuth, *shares, both_sides=False)
-    return Approach(largest[0], largest[2])
+    pairs = Pairs.of(
+        period_1=period_1,
+        damping_1=damping_1,
+        participation_1=participation_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        participation_2=participation_2,
+        azimuth=azimuth,
+    )
+    displacement, _, velocity = _maxima(
+        north, east, dt, pairs, FORGOTTEN_OF_APPROACH, both_sides=False
+    )
+    return Approach(displacement, velocity)
 
 
-def _directional_maxima(
-    north: ArrayLike,
-    east: ArrayLike,
-    dt: float,
-    period_1: ArrayLike,
-    damping_1: ArrayLike,
-    period_2: ArrayLike,
-    damping_2: ArrayLike,
-    azimuth: ArrayLike,
-    participation_1: ArrayLike,
-    participation_2: ArrayLike,
-    both_sides: bool = True,
+def _maxima(
+    north: ArrayLike, east: ArrayLike, dt: float, pairs: Pairs, forgotten: float, both_sides: bool
 ) -> FloatArray:
     """
     Return the largest displacements in both directions and velocity, (3, *shape of pairs).
 
     That of 2 before 1 is infinite unless ``both_sides`` is set.
     """
-    components = checks.record("north", north), checks.record("east", east)
-    if components[0].size != components[1].size:
-        raise ValueError(
-            f"north and east must be equally long, got {components[0].size} and "
-            f"{components[1].size}"
-        )
-    motion = closed_record(np.stack(components))
-    dt = checks.number("dt", dt, checks.positive)
+    motion = closed_record(both_components(north, east))
+    step, angle = checks.number("dt", dt, checks.positive), np.radians(pairs.azimuth)
+    numbers = np.concatenate([pairs.oscillators, [np.cos(angle), np.sin(angle)]])
 
-    # One column of arguments per pair: both structures, and the direction of the axis
-    first = checked_oscillators(1, period_1, damping_1, participation_1)
-    second = checked_oscillators(2, period_2, damping_2, participation_2)
-    angle = np.radians(checks.finite("azimuth", azimuth))
-    broadcast = np.broadcast_arrays(*first, *second, np.cos(angle), np.sin(angle))
-    pairs = np.stack([array.ravel() for array in broadcast])
-
-    # Largest q1 u1 - q2 u2, q2 u2 - q1 u1, and q1 v1 - q2 v2 of each pair
-    return _maxima(motion, dt, pairs, both_sides).reshape(3, *broadcast[0].shape)
-
-
-def _maxima(motion: FloatArray, dt: float, pairs: FloatArray, both_sides: bool) -> FloatArray:
-    """Run the kernel on pairs sorted by their memory, so that alike pairs share a block."""
-    # rate at which the free vibration of the more persistent structure fades
-    order = np.argsort(np.minimum(pairs[0] * pairs[1], pairs[3] * pairs[4]))
-    ordered = np.empty((3, pairs.shape[1]))
-    ascending = np.ascontiguousarray(pairs[:, order])
-    forgotten = FORGOTTEN if both_sides else FORGOTTEN_OF_APPROACH
-    relative_maxima(motion[0], motion[1], dt, ascending, forgotten, both_sides, ordered)
+    # Sorted by the rate at which free vibration fades, so that alike pairs share a block
+    order = np.argsort((pairs.frequency * pairs.damping).min(axis=0))
+    ascending = np.ascontiguousarray(numbers[:, order])
+    ordered = np.empty((3, order.size))
+    relative_maxima(*motion, step, ascending, forgotten, both_sides, ordered)
 
     # Back to the order of the arguments
     largest = np.empty_like(ordered)
     largest[:, order] = ordered
-    return largest
+    return largest.reshape(3, *pairs.shape)
 
 
 class YieldingRelativeDisplacement(NamedTuple):
@@ -347,8 +328,8 @@ def yielding_relative_displacement(
     [0.098 0.083] [0.094 0.08 ]
     """
     step = checks.number("dt", dt, checks.positive)
-    record = _two_components(acceleration)
-    fields, shape = pair_fields(
+    record = ground_motion(acceleration)
+    pairs = Pairs.of(
         period_1=period_1,
         damping_1=damping_1,
         period_2=period_2,
@@ -360,52 +341,19 @@ def yielding_relative_displacement(
         hardening_1=hardening_1,
         yield_displacement_2=yield_displacement_2,
         hardening_2=hardening_2,
-        mass_1=1.0,  # without contact no mass matters
-        mass_2=1.0,
         gap=UNREACHABLE,
     )
 
     # Run the record and the free vibration after it
-    rows = _run(np.ascontiguousarray(closed_record(record)), step, fields)
+    kernel = run_without_contact, LANE_ROWS_WITHOUT_CONTACT
+    rows, _ = run_pairs(*kernel, closed_record(record), step, pairs, free_vibration=True)
 
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
-    one_before_two = rows[:, 1, columns.OPENING].reshape(shape)
-    two_before_one = rows[:, 0, columns.OPENING].reshape(shape)
+    openings = rows[:, :, columns.OPENING].T.reshape(2, *pairs.shape)
     return YieldingRelativeDisplacement(
-        one_before_two=one_before_two,
-        two_before_one=two_before_one,
-        largest=np.maximum(one_before_two, two_before_one),
-        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
-        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
+        one_before_two=openings[1, ...],
+        two_before_one=openings[0, ...],
+        largest=openings.max(axis=0),
+        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
+        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
     )
-
-
-def _two_components(acceleration: ArrayLike) -> FloatArray:
-    """Return checked north and east components, (2, n_samples)."""
-    record = checks.finite("acceleration", acceleration)
-    if record.ndim != 2 or record.shape[0] != 2 or record.size == 0:
-        raise ValueError(
-            f"acceleration must be north and east (2, n_samples), got shape {record.shape}"
-        )
-    return record
-
-
-def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> FloatArray:
-    """Return the rows of all pairs after the record, run in blocks on all processors."""
-    table = pair_table(fields)
-    rows = row_at_rest(table, fields["gap"][:, np.newaxis], np.zeros((len(table), 1)))
-    parts, free_steps = refinements(table, dt), free_vibration_steps(fields, dt)
-
-    # Pairs without contact have separate kernels
-    angles = np.radians(fields["azimuth"])
-    run_blocks(
-        run_without_contact,
-        LANE_ROWS_WITHOUT_CONTACT,
-        components,
-        dt,
-        rows,
-        parts,
-        free_steps,
-        angles,
-    )
-    return rows

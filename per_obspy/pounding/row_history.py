@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,10 +17,12 @@ from per_obspy.kernels.pounding_events.contact import (
 )
 from per_obspy.kernels.pounding_events.row_history import run_history
 from per_obspy.pounding.kernel_tables import (
+    SPEED_SHARE,
     closed_record,
     free_samples,
     largest_ground_velocity,
     refinement,
+    refuse_pressed_walls,
     row_at_rest,
     structure_table,
 )
@@ -62,22 +63,11 @@ class Energies(NamedTuple):
 
 def energies_of(table: FloatArray, motion: FloatArray, work: FloatArray) -> Energies:
     """
-    Compute the energies of a motion and of the work done along it.
+    Return the energies of a motion and of the work done along it.
 
-    Parameters
-    ----------
-    table : (n_structures, 6) ndarray
-        Half damping rate (1/s), squared frequency (rad²/s²), hardening, yield displacement (m),
-        participation, mass (kg).
-    motion : (n_time, n_structures, 3) ndarray
-        Displacement (m), velocity (m/s), plastic displacement (m).
-    work : (n_time, n_structures, 4) ndarray
-        Input, damping, hysteretic and transferred energy, J.
-
-    Returns
-    -------
-    Energies
-        In J.
+    ``table`` is that of the kernels; ``motion`` (n_time, n_structures, 3) holds displacement (m),
+    velocity (m/s) and plastic displacement (m), ``work`` (n_time, n_structures, 4) input, damping,
+    hysteretic and transferred energy (J).
     """
     _, stiffness, hardening, limit, _, mass = table.T
     mass = np.where(np.isinf(mass), np.nan, mass)
@@ -90,41 +80,24 @@ def energies_of(table: FloatArray, motion: FloatArray, work: FloatArray) -> Ener
     elastic = 0.5 * mass * stiffness * squares
 
     # Work done along the motion, NaN for structures of infinite mass
-    done, damping, hysteretic, transfer = np.moveaxis(work + 0.0 * mass[:, np.newaxis], 2, 0)
-    return Energies(done.T, kinetic.T, damping.T, elastic.T, hysteretic.T, transfer.T)
+    done, damping, hysteretic, transfer = (work + 0.0 * mass[:, np.newaxis]).T
+    return Energies(done, kinetic.T, damping, elastic.T, hysteretic, transfer)
 
 
 def closure_of(energies: Energies) -> float:
     """
-    Compute the largest imbalance of (3), (4) over the largest input or transferred energy.
+    Return the largest imbalance of (3), (4) over the largest input or transferred energy.
 
-    Parameters
-    ----------
-    energies : Energies
-        Of all structures, J.
-
-    Returns
-    -------
-    float
-        Dimensionless; structures of infinite mass are left out, and one that never moves counts as
-        balanced.
+    Structures of infinite mass are left out, and one that never moves counts as balanced.
     """
-    # Left side of (3), (4)
-    stored = energies.kinetic + energies.damping + energies.elastic
-    spent = stored + energies.hysteretic + energies.transfer
-    finite = ~np.isnan(energies.input[:, 0])
-    imbalance = np.abs(spent - energies.input)[finite].max(axis=1, initial=0.0)
+    gained, *spent = (part[~np.isnan(energies.input[:, 0])] for part in energies)
+    imbalance = np.abs(sum(spent) - gained).max(axis=1, initial=0.0)
 
     # Relative to the larger of input and transfer of each structure
-    exchanged = np.maximum(np.abs(energies.input), np.abs(energies.transfer))
-    scale = exchanged[finite].max(axis=1, initial=0.0)
-    share = np.divide(imbalance, scale, out=np.zeros_like(scale), where=scale > 0)
-    return float(share.max(initial=0.0))
+    scale = np.maximum(np.abs(gained), np.abs(spent[-1])).max(axis=1, initial=0.0)
+    return float((imbalance / np.where(scale > 0, scale, np.inf)).max(initial=0.0))
 
 
-#: Bouncing ends in contact once the separation speed is below this share of the largest ground
-#: velocity.
-SPEED_SHARE = 1e-11
 #: Impacts within one sampling interval after which structures that are pressed together stay in
 #: contact.
 BOUNCES_OF_ROWS = 100_000
@@ -189,20 +162,6 @@ class PoundingHistory(NamedTuple):
     opening_maxima: FloatArray
     energies: Energies
     closure: float
-
-
-class _KernelRun(NamedTuple):
-    """
-    Arrays that the kernel has filled.
-
-    ``row`` (n_structures, COLUMNS) at the end, ``log`` (n_impacts, 9), and per sample ``motion``
-    (n_time, n_structures, 3) and ``work`` (n_time, n_structures, 4).
-    """
-
-    row: FloatArray
-    log: FloatArray
-    motion: FloatArray
-    work: FloatArray
 
 
 @takes_trace
@@ -272,30 +231,41 @@ def pounding_history(
     step = checks.number("dt", dt, checks.positive)
     gap, bounce = _checked_gaps(gaps, restitution, len(structures))
     table = structure_table(structures)
-    _refuse_pressed_walls(table[:, 5], gap)
+    refuse_pressed_walls(table[:, 5], gap, np.zeros(len(table), dtype=np.int64), "structures")
 
     # Follow the free vibration after the record
     samples = record.size
     if free_vibration:
         record = closed_record(record)
-        samples = record.size + free_samples(max(s.period for s in structures), step)
-    run = _run(record, step, table, gap, bounce, samples)
-    return _history(step, table, run)
+        samples = record.size + int(free_samples(max(one.period for one in structures), step))
+
+    # Limits at which bouncing ends in contact
+    start = row_at_rest(table, gap, bounce)
+    velocity = SPEED_SHARE * largest_ground_velocity(record, step)
+    start[0, columns.STICKING_SPEED] = velocity * table[:, 4].max()
+    start[0, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS
+    return _history(step, table, *_run(record, step, start, samples))
 
 
-def _history(dt: float, table: FloatArray, run: _KernelRun) -> PoundingHistory:
+def _history(
+    dt: float,
+    table: FloatArray,
+    row: FloatArray,
+    log: FloatArray,
+    motion: FloatArray,
+    work: FloatArray,
+) -> PoundingHistory:
     """Return motion, impacts, maxima and energies by name."""
-    row = run.row
-    displacement, velocity, plastic = np.moveaxis(run.motion, 0, 2).swapaxes(0, 1).copy()
+    displacement, velocity, plastic = motion.T.copy()
 
     # Energy balance (3), (4)
-    energies = energies_of(table, run.motion, run.work)
+    energies = energies_of(table, motion, work)
     return PoundingHistory(
-        time=dt * np.arange(len(run.motion), dtype=np.float64),
+        time=dt * np.arange(len(motion), dtype=np.float64),
         displacement=displacement,
         velocity=velocity,
         plastic_displacement=plastic,
-        impacts=impact_table(run.log),
+        impacts=impact_table(log),
         per=np.sqrt(row[:, columns.LARGEST_RADIUS_SQUARED]),
         displacement_maxima=row[:, columns.LARGEST_DISPLACEMENT].copy(),
         energy_radius=np.sqrt(row[:, columns.LARGEST_ENERGY_RADIUS_SQUARED]),
@@ -306,63 +276,33 @@ def _history(dt: float, table: FloatArray, run: _KernelRun) -> PoundingHistory:
 
 
 def _run(
-    record: FloatArray,
-    step: float,
-    table: FloatArray,
-    gap: FloatArray,
-    bounce: FloatArray,
-    samples: int,
-) -> _KernelRun:
-    """Run the kernel, a second time if the log of impacts was too short."""
-    parts = refinement(math.sqrt(table[:, 1].max()), step)
-    motion, work = np.zeros((samples, len(table), 3)), np.zeros((samples, len(table), 4))
+    record: FloatArray, step: float, start: FloatArray, samples: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """
+    Return what the kernel fills from rows at rest: rows at the end, log, motion and work.
 
-    # Each run of the kernel starts at rest
-    start = _row_at_start(record, step, table, gap, bounce)
+    Log of (n_impacts, 9), motion (n_time, n_structures, 3) and work (n_time, n_structures, 4).
+    """
+    # Memory of the motion and work at every sample
+    parts = int(refinement(math.sqrt(start[:, columns.STIFFNESS].max()), step))
+    motion, work = np.zeros((samples, len(start), 3)), np.zeros((samples, len(start), 4))
+    room, impacts = -1, FIRST_ROOM
 
     # Grow the log until all impacts have room
-    room, impacts = -1, FIRST_ROOM
     while room < impacts:
         room = impacts
         row, log = start.copy(), np.zeros((room, LOG_COLUMNS))
         used = run_history(record, step, parts, row, log, motion, work)
         if used < 0:
-            _raise_endless(-used * step)
+            raise RuntimeError(
+                f"no end of contacts at {-used * step:g} s: more than {2 * BOUNCES_OF_ROWS} events"
+            )
         impacts = int(row[:, columns.IMPACTS].sum())
-    return _KernelRun(row, log[:impacts], motion[:used], work[:used])
-
-
-def _row_at_start(
-    record: FloatArray, step: float, table: FloatArray, gap: FloatArray, bounce: FloatArray
-) -> FloatArray:
-    """Return the row at rest, with the limits at which bouncing ends in contact."""
-    row = row_at_rest(table, gap, bounce)
-    velocity = SPEED_SHARE * largest_ground_velocity(record, step)
-    row[0, columns.STICKING_SPEED] = velocity * table[:, 4].max()
-    row[0, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS
-    return row
-
-
-def _raise_endless(time: float) -> NoReturn:
-    """Raise the error of contacts that have no end, at a time in s."""
-    raise RuntimeError(f"no end of contacts at {time:g} s: more than {2 * BOUNCES_OF_ROWS} events")
+    return row, log[:impacts], motion[:used], work[:used]
 
 
 def impact_table(log: FloatArray) -> pd.DataFrame:
-    """
-    Return the table of impacts.
-
-    Parameters
-    ----------
-    log : (n_impacts, 9) ndarray
-        Time (s), left structure, velocity before and after of the left and the right one (m/s),
-        impulse (N s), displacement of both (m).
-
-    Returns
-    -------
-    DataFrame
-        As in `PoundingHistory`.
-    """
+    """Return the table of impacts, as in `PoundingHistory`, from the columns of ``LOGGED``."""
     table = pd.DataFrame(log, columns=LOGGED).astype({"left": np.int64})
 
     # Transfer energies (9), (10) in their short form: impulse times mean velocity
@@ -382,29 +322,15 @@ def _checked_gaps(
     gaps: ArrayLike, restitution: ArrayLike, structures: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return gap and restitution of each gap of a row of structures."""
-    gap = _for_each_gap("gaps", checks.not_negative("gaps", gaps), structures)
-    coefficient = checks.between("restitution", restitution, 0.0, 1.0)
-    return gap, _for_each_gap("restitution", coefficient, structures)
-
-
-def _for_each_gap(name: str, values: FloatArray, structures: int) -> FloatArray:
-    """Return one value per gap."""
+    gap = checks.not_negative("gaps", gaps)
+    bounce = checks.between("restitution", restitution, 0.0, 1.0)
     if structures < 2:
         raise ValueError(f"structures must be two or more, got {structures}")
-    if values.shape not in {(), (1,), (structures - 1,)}:
-        raise ValueError(
-            f"{name} must be one number or {structures - 1}, one a gap, "
-            f"got the shape {values.shape}"
-        )
-    return np.array(np.broadcast_to(values, structures - 1))
-
-
-def _refuse_pressed_walls(mass: FloatArray, gap: FloatArray) -> None:
-    """Refuse two walls (infinite masses) with an interface or without a gap between them."""
-    walls = np.flatnonzero(np.isinf(mass))
-    for left, right in pairwise(walls):
-        if right == left + 1 or not gap[left:right].any():
+    # One number for all gaps, or one a gap
+    for name, values in (("gaps", gap), ("restitution", bounce)):
+        if values.shape not in {(), (1,), (structures - 1,)}:
             raise ValueError(
-                f"mass of structures {left} and {right} is infinite, "
-                "with no room to move between them"
+                f"{name} must be one number or {structures - 1}, one a gap, "
+                f"got the shape {values.shape}"
             )
+    return np.broadcast_to(gap, structures - 1), np.broadcast_to(bounce, structures - 1)

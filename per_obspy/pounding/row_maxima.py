@@ -18,8 +18,11 @@ from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
 from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
 from per_obspy.pounding.kernel_tables import (
+    SHORTEST_BOUNCE,
+    SPEED_SHARE,
     KeptLogs,
     aligned,
+    both_components,
     closed_record,
     free_samples,
     largest_ground_velocity,
@@ -27,19 +30,17 @@ from per_obspy.pounding.kernel_tables import (
     refinement,
     run_blocks,
 )
-from per_obspy.pounding.pair_histories import SHORTEST_BOUNCE
-from per_obspy.pounding.row_history import SPEED_SHARE
 from per_obspy.pounding.row_tables import (
-    BUILDING_FIELDS,
+    BuildingRows as BuildingRows,
+)
+from per_obspy.pounding.row_tables import (
     RowScales,
     building_table,
     checked_rows,
     parts_of,
     row_scales,
     run_in_parts,
-)
-from per_obspy.pounding.row_tables import (
-    BuildingRows as BuildingRows,
+    some_buildings,
 )
 from per_obspy.spectra.per_pair import azimuth_maxima
 from per_obspy.threads import map_in_threads
@@ -61,19 +62,8 @@ def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArr
     """
     Return the rows of each block: of equal refinement, 32 buildings at most in all.
 
-    Parameters
-    ----------
-    first : (n_rows + 1,) ndarray of int
-        First building of each row, then the number of buildings.
-    parts : (n_rows,) ndarray of int
-        Steps of a sampling interval.
-    some : (n,) ndarray of int
-        Numbers of the rows that are packed.
-
-    Returns
-    -------
-    list of ndarray of int
-        Numbers of the rows; a row of more than 32 buildings is a separate block.
+    Of ``some`` rows, by their first buildings and steps per sampling interval; a row of more than
+    32 buildings is a separate block.
     """
     sizes = np.diff(first)
     blocks = []
@@ -131,47 +121,35 @@ def run_row_blocks(
     RuntimeError
         If a step has more events than any record causes.
     """
-    sizes = np.diff(first)
     # Rows of two are pairs, of which a block has more
-    counts = np.zeros(len(lines), dtype=np.int64)
-    left, steps = _pairs(first, parts, free_steps, azimuth)
-    counts[left] = _run_pairs(ground, dt, left, lines, steps)
-    records = records_in_steps(ground, parts, dt)
-    kept = KeptLogs(MOST_ROWS, FIRST_ROOM)
+    counts, sizes = _run_pairs(ground, dt, first, lines, parts, free_steps, azimuth), np.diff(first)
+    records, kept = records_in_steps(ground, parts, dt), KeptLogs(MOST_ROWS, FIRST_ROOM)
 
     def run(block: IntArray) -> None:
         """Run the rows of one block, and write their results to their places."""
-        # Blocks do not depend on each other
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
-        record = records[int(parts[block[0]])]
-        others = azimuth[block], free_steps[block]
-        start, own = lines[members], sizes[block]
-        found = _counted_block(record, start, own, others, scale[members], kept)
-        lines[members], counts[members] = found
+        # Blocks do not depend on each other
+        record, others = records[int(parts[block[0]])], (azimuth[block], free_steps[block])
+        counted = _counted_block(record, lines[members], sizes[block], others, scale[members], kept)
+        lines[members], counts[members] = counted
 
     map_in_threads(run, packed_rows(first, parts, np.flatnonzero(sizes != 2)))
     return counts
 
 
-def _pairs(
-    first: IntArray, *columns_of_rows: NDArray[Any]
-) -> tuple[IntArray, tuple[NDArray[Any], ...]]:
-    """Return the left buildings of rows of two, and columns of these rows."""
-    pairs = np.flatnonzero(np.diff(first) == 2)
-    return first[pairs], tuple(column[pairs] for column in columns_of_rows)
-
-
 def _run_pairs(
     ground: FloatArray,
     dt: float,
-    left: IntArray,
+    first: IntArray,
     lines: FloatArray,
-    steps: tuple[NDArray[Any], ...],
+    *of_rows: NDArray[Any],
 ) -> IntArray:
-    """Carry rows of two from their left buildings through a record; return impacts that count."""
-    both = left[:, np.newaxis] + np.arange(2)
-    rows = lines[both]
-    counts = run_blocks(run_block, LANE_ROWS, ground, dt, rows, *steps)
+    """Carry rows of two through a record; return impacts that count after each building."""
+    counts, pairs = np.zeros(len(lines), dtype=np.int64), np.flatnonzero(np.diff(first) == 2)
+    both = first[pairs, np.newaxis] + np.arange(2)
+    # Lines of both buildings as a row
+    rows, steps = lines[both], [column[pairs] for column in of_rows]
+    counts[both[:, 0]] = run_blocks(run_block, LANE_ROWS, ground, dt, rows, *steps)
     lines[both] = rows
     return counts
 
@@ -185,7 +163,7 @@ def _counted_block(
     kept: KeptLogs,
 ) -> tuple[FloatArray, IntArray]:
     """Return the buildings of one block at the end, and impacts that count."""
-    firsts = np.concatenate([[0], np.cumsum(sizes)])
+    firsts = np.append(0, np.cumsum(sizes))
     own, logs = run_logged_block(record, start, firsts, *others, kept)
     # Row by row
     counts = []
@@ -204,66 +182,42 @@ def run_logged_block(
     kept: KeptLogs,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Carry the rows of one block through a record, with a log of every impact.
+    Return the buildings of one block at the end, and logs of all impacts that may count.
 
-    Parameters
-    ----------
-    record : Record
-        Ground motion and the steps through it.
-    start : (n_buildings, ROW_COLUMNS) ndarray
-        Buildings at rest.
-    firsts : (n_rows + 1,) ndarray of int
-        First building of each row, then the number of buildings.
-    azimuth : (n_rows,) ndarray
-        Of the axis of each row, rad.
-    free : (n_rows,) ndarray of int
-        Sampling intervals of free vibration at most.
-    kept : KeptLogs
-        Memory of the logs; to be given back.
-
-    Returns
-    -------
-    lines : (n_buildings, ROW_COLUMNS) ndarray
-        Buildings at the end.
-    logs : (n_rows, n_lines, LOG_COLUMNS) ndarray
-        All impacts of each row that may count.
-
-    Raises
-    ------
-    RuntimeError
-        If a step has more events than any record causes, or a row too many impacts.
+    ``start`` (n_buildings, ROW_COLUMNS) are at rest; rows have their first buildings ``firsts``
+    (n_rows + 1), axis (rad) and sampling intervals of free vibration at most. The logs (n_rows,
+    n_lines, LOG_COLUMNS) are memory that is kept, and are to be given back.
     """
-    direction = np.cos(azimuth), np.sin(azimuth)
-    room = kept.impacts
-    # Grow the logs until all impacts of every row have room
-    while True:
-        logs = kept.room(firsts.size - 1, room)
-        # The kernels change the lines and the steps of free vibration
-        own = start.copy()
-        if len(own) > PAIR_LANES:
-            is_through = _run_alone(record, own, logs[0], direction, int(free[0]))
-        else:
-            is_through = _run_in_lanes(record, own, logs, firsts, direction, free.copy())
-        if not is_through:
+    own, direction = start.copy(), (np.cos(azimuth), np.sin(azimuth))
+    run = _run_alone if len(own) > PAIR_LANES else _run_in_lanes
+
+    def fill(logs: FloatArray) -> int:
+        """Run the block from rest; the kernels change the lines and the steps of free vibration."""
+        own[:] = start
+        if not run(record, own, logs, firsts, direction, free.copy()):
             raise RuntimeError("no end of events in a step of a row")
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
-        if impacts <= room:
-            return own, logs
         if impacts > MOST_IMPACTS:
             raise RuntimeError(f"a row has {impacts} impacts that may count, most {MOST_IMPACTS}")
-        kept.keep(logs)
-        room = impacts
+        return impacts
+
+    # Most impacts of a row decide on the room of all
+    return own, kept.fill(firsts.size - 1, fill)
 
 
 def _run_alone(
-    record: Record, row: FloatArray, log: FloatArray, direction: tuple[FloatArray, ...], free: int
+    record: Record,
+    row: FloatArray,
+    logs: FloatArray,
+    _: IntArray,
+    direction: tuple[FloatArray, FloatArray],
+    free: IntArray,
 ) -> bool:
     """Run a row of more buildings than there are lanes; return whether it got through."""
     north, east = record.components
     cosine, sine = (float(component[0]) for component in direction)
-    dt = record.duration * record.refinement
-    run = run_row_by_events(north, east, cosine, sine, dt, record.refinement, row, log, free)
-    return bool(run)
+    steps = record.duration * record.refinement, record.refinement
+    return bool(run_row_by_events(north, east, cosine, sine, *steps, row, logs[0], int(free[0])))
 
 
 def _run_in_lanes(
@@ -271,7 +225,7 @@ def _run_in_lanes(
     own: FloatArray,
     logs: FloatArray,
     firsts: IntArray,
-    direction: tuple[FloatArray, ...],
+    direction: tuple[FloatArray, FloatArray],
     free: IntArray,
 ) -> bool:
     """Run the rows of a block in lanes; return whether all got through."""
@@ -417,10 +371,10 @@ def _maxima(
     with_pairs: bool,
 ) -> tuple[RowMaxima, RowMaxima]:
     """Return the maxima of rows and of pairs alone, where these are computed."""
-    # Check every argument; the ground comes to rest before free vibration
+    # The ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
-    ground = np.stack([checks.record("north", north), checks.record("east", east)])
+    ground = both_components(north, east)
     if free_vibration:
         ground = closed_record(ground)
 
@@ -428,17 +382,14 @@ def _maxima(
     maxima = np.zeros((checked.period.size, MAXIMA))
     maxima[:, :2] = _alone(ground, step, checked, free_vibration)
     free = maxima[:, 1].copy()
+    pairs = run_in_parts(
+        checked, maxima, lambda parts: _run(ground, step, parts, free_vibration), with_pairs
+    )
     next_free = np.stack([free, np.append(free[1:], 0.0)], axis=1)
-
-    def run(parts: BuildingRows) -> FloatArray:
-        """Return the maxima of some parts as rows."""
-        return _run(ground, step, parts, free_vibration)
-
-    pairs = run_in_parts(checked, maxima, run, with_pairs)
-    return _named(maxima, free), _named(pairs, next_free)
+    return _row_maxima(maxima, free), _row_maxima(pairs, next_free)
 
 
-def _named(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
+def _row_maxima(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
     """Return maxima by their names."""
     displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
     return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
@@ -448,14 +399,13 @@ def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bo
     """Return the largest displacement and radius of every building alone, (n_buildings, 2)."""
     # Elastic ones from the record directly, with the free vibration after it
     azimuth = np.repeat(rows.azimuth, np.diff(rows.first))
-    found = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
-    maxima = np.stack([found.sd, found.per], axis=1)
+    alone = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
+    maxima = np.stack([alone.sd, alone.per], axis=1)
     # Others are rows of one building
-    followed = np.isfinite(rows.yield_displacement) | (not free_vibration)
-    if followed.any():
-        every = np.ones(followed.size, dtype=bool)
-        alone = parts_of(rows, every, followed)
-        maxima[followed] = _run(ground, dt, alone, free_vibration)[:, :2]
+    others = np.isfinite(rows.yield_displacement) | (not free_vibration)
+    if others.any():
+        single = parts_of(rows, np.ones_like(others), others)
+        maxima[others] = _run(ground, dt, single, free_vibration)[:, :2]
     return maxima
 
 
@@ -464,13 +414,10 @@ def _run(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
     maxima = np.empty((rows.period.size, MAXIMA))
     # The lines of the kernels take 900 bytes per building
     for begin in range(0, rows.azimuth.size, PART):
-        end = min(begin + PART, rows.azimuth.size)
-        place = slice(rows.first[begin], rows.first[end])
-        fields = {name: getattr(rows, name)[place] for name in BUILDING_FIELDS}
-        # Rows of this part, counted from its first building
-        first = rows.first[begin : end + 1] - rows.first[begin]
-        part = BuildingRows(first, **fields, azimuth=rows.azimuth[begin:end])
-        maxima[place] = _run_part(ground, dt, part, free_vibration)
+        first = rows.first[begin : begin + PART + 1]
+        buildings = np.arange(first[0], first[-1])
+        part = some_buildings(rows, buildings, first - first[0])
+        maxima[buildings] = _run_part(ground, dt, part, free_vibration)
     return maxima
 
 
@@ -479,7 +426,9 @@ def _run_part(
 ) -> FloatArray:
     """Return the maxima of some rows."""
     scales = row_scales(rows)
-    lines, counts = _lines_at_end(ground, dt, rows, scales, free_vibration)
+    lines = _lines_at_rest(rows, scales)
+    counts = _run_lines(ground, dt, rows, scales, lines, free_vibration)
+
     # The lines hold squares of the largest radii
     displacement = lines[:, columns.LARGEST_DISPLACEMENT] / scales.displacement
     radius = np.sqrt(lines[:, columns.LARGEST_RADIUS_SQUARED]) / scales.displacement
@@ -487,47 +436,39 @@ def _run_part(
     return np.stack([displacement, radius, approach, counts], axis=1)
 
 
-def _lines_at_end(
-    ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return the lines of all buildings at the end, and impacts that count."""
-    # Steps per sampling interval, from the shortest period of each row
-    table = building_table(rows, scales)
-    starts = rows.first[:-1]
-    frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
-    parts = np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
-    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
-    lines = _lines_at_rest(table, rows, scales, velocity, dt / parts)
-
-    # Run the record and, where it is asked for, the free vibration after it
-    longest = np.maximum.reduceat(rows.period, starts)
-    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
-    steps = parts, free * free_vibration
-    azimuth = np.radians(rows.azimuth)
-    counts = run_row_blocks(ground, dt, rows.first, lines, *steps, azimuth, scales.clearance)
-    return lines, counts
-
-
-def _lines_at_rest(
-    table: FloatArray,
+def _run_lines(
+    ground: FloatArray,
+    dt: float,
     rows: BuildingRows,
     scales: RowScales,
-    ground_velocity: float,
-    duration: FloatArray,
-) -> FloatArray:
-    """Return the kernels' lines of all buildings; ``duration`` is that of a step of each row."""
+    lines: FloatArray,
+    free_vibration: bool,
+) -> IntArray:
+    """Carry the lines of all buildings from rest to the end; return impacts that count."""
+    starts = rows.first[:-1]
+    of_rows = np.column_stack([lines[:, [columns.STIFFNESS, columns.PARTICIPATION]], rows.period])
+    stiffness, drive, period = np.maximum.reduceat(of_rows, starts).T
+
+    # Steps per sampling interval, and the free vibration after the record where it is asked for
+    parts = refinement(np.sqrt(stiffness), dt)
+    steps = parts, free_samples(period, dt) * free_vibration, np.radians(rows.azimuth)
+
+    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
+    velocity = SPEED_SHARE * sum(largest_ground_velocity(one, dt) for one in ground)
+    lines[starts, columns.STICKING_SPEED] = velocity * drive
+    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, np.diff(rows.first) - 1)
+    return run_row_blocks(ground, dt, rows.first, lines, *steps, scales.clearance)
+
+
+def _lines_at_rest(rows: BuildingRows, scales: RowScales) -> FloatArray:
+    """Return the kernels' lines of all buildings; when bounces end is still to be set."""
+    lines = np.zeros((rows.period.size, columns.ROW_COLUMNS))
+    lines[:, :6] = building_table(rows, scales)
+
     # The last building of a row has no neighbour on its right: its gap is 1
-    lines = np.zeros((len(table), columns.ROW_COLUMNS))
-    lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap
     lines[:, columns.RESTITUTION] = rows.restitution
     lines[:, COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
-
-    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
-    starts, sizes = rows.first[:-1], np.diff(rows.first)
-    largest = np.maximum.reduceat(table[:, 4], starts)
-    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * largest
-    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * duration
-    lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, sizes - 1)
     return lines

@@ -18,7 +18,6 @@ again.
 """
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.pounding.kernel_tables import kernel_table, refuse_pressed_walls
+from per_obspy.pounding.structure import PAIR_CHECKS
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
@@ -75,40 +76,36 @@ class BuildingRows(NamedTuple):
 BUILDING_FIELDS = BuildingRows._fields[1:-1]
 
 
+#: Check of each of these fields.
+ROW_CHECKS = {
+    **PAIR_CHECKS,
+    "participation_left": checks.positive,
+    "participation_right": checks.positive,
+}
+
+
 def checked_rows(rows: BuildingRows) -> BuildingRows:
     """
-    Return rows with every field checked, and the fields without meaning at rest.
+    Return rows with every field checked, and 1 in fields without meaning.
 
-    Parameters
-    ----------
-    rows : BuildingRows
-        As from a caller.
-
-    Returns
-    -------
-    BuildingRows
-        Participation towards a neighbour that does not exist is 1, gap and restitution after the
-        last building are 1.
-
-    Raises
-    ------
-    ValueError
-        If a field has the wrong shape or is out of range, a row is empty, or two walls (infinite
-        masses) are pressed together.
+    Refused with ``ValueError`` is a field of the wrong shape or out of range, an empty row, and two
+    walls (infinite masses) that are pressed together.
     """
     # Shapes
     first = _checked_first(rows.first)
-    count = int(first[-1])
     fields = {name: checks.numbers(name, getattr(rows, name)) for name in BUILDING_FIELDS}
-    azimuth = checks.finite("azimuth", rows.azimuth)
-    for name, values in {**fields, "azimuth": azimuth}.items():
-        expected = first.size - 1 if name == "azimuth" else count
+    fields["azimuth"] = checks.finite("azimuth", rows.azimuth)
+    for name, values in fields.items():
+        expected = first.size - 1 if name == "azimuth" else int(first[-1])
         if values.shape != (expected,):
             raise ValueError(f"{name} must have the shape ({expected},), got {values.shape}")
 
-    checked = with_ends(BuildingRows(first, **fields, azimuth=azimuth))
-    _check_ranges(checked)
-    _refuse_pressed_walls(checked)
+    # Ranges where a field has a meaning
+    checked = with_ends(BuildingRows(first, **fields))
+    for name in BUILDING_FIELDS:
+        ROW_CHECKS[name](name, getattr(checked, name))
+    row = np.repeat(np.arange(first.size - 1), np.diff(first))
+    refuse_pressed_walls(checked.mass, checked.gap, row, "the buildings at index")
     return checked
 
 
@@ -128,39 +125,19 @@ def _checked_first(first: ArrayLike) -> IntArray:
 
 def with_ends(rows: BuildingRows) -> BuildingRows:
     """Return rows with 1 in place of every term of a neighbour that a row does not have."""
-    begins, ends = rows.first[:-1], rows.first[1:] - 1
-    # Buildings of these terms
-    index = dict.fromkeys(("participation_right", "gap", "restitution"), ends)
-    index["participation_left"] = begins
-    columns = {name: getattr(rows, name).copy() for name in index}
-    for name, column in columns.items():
-        column[index[name]] = 1.0
+    columns = {}
+    for name in ("participation_left", "participation_right", "gap", "restitution"):
+        columns[name] = getattr(rows, name).copy()
+        is_left = name == "participation_left"
+        columns[name][rows.first[:-1] if is_left else rows.first[1:] - 1] = 1.0
     return rows._replace(**columns)
 
 
-def _check_ranges(rows: BuildingRows) -> None:
-    """Refuse values of buildings and interfaces that are out of range."""
-    for name in ("period", "participation_left", "participation_right"):
-        checks.positive(name, getattr(rows, name))
-    for name in ("mass", "yield_displacement"):
-        checks.positive_or_infinite(name, getattr(rows, name))
-    for name in ("damping", "hardening"):
-        checks.fraction_of_critical(name, getattr(rows, name))
-    checks.not_negative("gap", rows.gap)
-    checks.between("restitution", rows.restitution, 0.0, 1.0)
-
-
-def _refuse_pressed_walls(rows: BuildingRows) -> None:
-    """Refuse two walls of a row with an interface or without a gap between them."""
-    # Neighbouring walls of one row
-    walls = np.flatnonzero(np.isinf(rows.mass))
-    row = np.searchsorted(rows.first, walls, side="right") - 1
-    for (left, row_left), (right, row_right) in pairwise(zip(walls, row, strict=True)):
-        if row_left == row_right and (right == left + 1 or not rows.gap[left:right].any()):
-            raise ValueError(
-                f"mass of the buildings at index {left} and {right} is infinite, "
-                "with no room to move between them"
-            )
+def some_buildings(rows: BuildingRows, buildings: IntArray, first: IntArray) -> BuildingRows:
+    """Return some buildings as rows that begin at ``first`` among them, on the axes they have."""
+    fields = {name: getattr(rows, name)[buildings] for name in BUILDING_FIELDS}
+    row = np.searchsorted(rows.first, buildings[first[:-1]], side="right") - 1
+    return with_ends(BuildingRows(first, **fields, azimuth=rows.azimuth[row]))
 
 
 class RowScales(NamedTuple):
@@ -174,16 +151,8 @@ def row_scales(rows: BuildingRows) -> RowScales:
     """
     Return the scales ``s`` and ``c`` at which both participations of every interface are 1.
 
-    Parameters
-    ----------
-    rows : BuildingRows
-        Checked.
-
-    Returns
-    -------
-    RowScales
-        Dimensionless. The scale of the clearance is 1 for the first interface of a row; where both
-        participations of every building are equal, it is exactly 1 for all.
+    The scale of the clearance is 1 for the first interface of a row; where both participations of
+    every building are equal, it is exactly 1 for all.
     """
     starts, sizes = rows.first[:-1], np.diff(rows.first)
     ratio = rows.participation_left / rows.participation_right
@@ -201,31 +170,10 @@ def row_scales(rows: BuildingRows) -> RowScales:
 
 
 def building_table(rows: BuildingRows, scales: RowScales) -> FloatArray:
-    """
-    Return the kernels' table of structures of all buildings.
-
-    Parameters
-    ----------
-    rows : BuildingRows
-        Checked.
-    scales : RowScales
-        Of these rows.
-
-    Returns
-    -------
-    (n_buildings, 6) ndarray
-        As from `structure_table`; displacements are ``s`` times those of the modal coordinate.
-    """
-    table = np.empty((rows.period.size, 6))
-    frequency = 2.0 * np.pi / rows.period
-    table[:, 0] = rows.damping * frequency
-    table[:, 1] = frequency**2
-    table[:, 2] = rows.hardening
-    # In the unit of the table: yield displacement, drive and mass
-    table[:, 3] = scales.displacement * rows.yield_displacement
-    table[:, 4] = scales.displacement
-    table[:, 5] = rows.mass / scales.displacement**2
-    return table
+    """Return `kernel_table` of all buildings; displacements are ``s`` times the modal ones."""
+    limit, mass = scales.displacement * rows.yield_displacement, rows.mass / scales.displacement**2
+    spring = rows.damping, 2.0 * np.pi / rows.period, rows.hardening, limit
+    return kernel_table(*spring, scales.displacement, mass)
 
 
 #: Share of a gap that largest displacements have to leave open: more than their rounding.
@@ -234,19 +182,9 @@ LEAST_OPENING = 1e-9
 
 def stays_open(rows: BuildingRows, displacement: FloatArray) -> BoolArray:
     """
-    Return after which buildings a row is divided, by the largest displacements on both sides.
+    Return after which buildings a row is divided, by the largest displacements ``|D|``, m.
 
-    Parameters
-    ----------
-    rows : BuildingRows
-        Checked.
-    displacement : (n_buildings,) ndarray
-        Largest ``|D|`` of every building, m.
-
-    Returns
-    -------
-    (n_buildings,) ndarray of bool
-        Whether the gap to the next building stays open, or there is none.
+    The gap to the next building stays open there, or there is none.
     """
     reach = rows.participation_right * displacement
     other = np.append((rows.participation_left * displacement)[1:], 0.0)
@@ -256,23 +194,9 @@ def stays_open(rows: BuildingRows, displacement: FloatArray) -> BoolArray:
 
 
 def parts_of(rows: BuildingRows, is_end: BoolArray, chosen: BoolArray) -> BuildingRows:
-    """
-    Return parts of rows as rows.
-
-    Parameters
-    ----------
-    rows : BuildingRows
-        Checked.
-    is_end : (n_buildings,) ndarray of bool
-        Whether a part ends with the building; true for the last one of each row.
-    chosen : (n_buildings,) ndarray of bool
-        Buildings of the parts, of which all are chosen or none.
-    """
-    fields = {name: getattr(rows, name)[chosen] for name in BUILDING_FIELDS}
+    """Return parts of rows, each to a building that ``is_end``, of which all or none is chosen."""
     ends = np.flatnonzero(is_end[chosen]) + 1
-    # The axis of a part is that of its row
-    azimuth = np.repeat(rows.azimuth, np.diff(rows.first))[chosen]
-    return with_ends(BuildingRows(np.append(0, ends), **fields, azimuth=azimuth[ends - 1]))
+    return some_buildings(rows, np.flatnonzero(chosen), np.append(0, ends))
 
 
 def run_in_parts(
@@ -304,59 +228,43 @@ def run_in_parts(
         where their gap stays open, and where the pair is not computed.
     """
     is_end = stays_open(rows, maxima[:, 0])
-    number = _number_in_part(is_end)
+    number = _counted(is_end, np.ones_like(is_end))
+
     # Parts of two among the pairs that may meet
     two = np.flatnonzero(~is_end & (number == 2))
-    pairs = _pairs_alone(rows, maxima, run, np.flatnonzero(~is_end) if with_pairs else two)
+    left = np.flatnonzero(~is_end) if with_pairs else two
+    after = np.minimum(np.arange(1, len(maxima) + 1), len(maxima) - 1)
+    pairs = np.stack([maxima, maxima[after]], axis=1)
+    # A pair alone has no other neighbours
+    if left.size:
+        both = np.stack([left, left + 1], axis=1).ravel()
+        alone = run(some_buildings(rows, both, 2 * np.arange(left.size + 1)))
+        pairs[left] = alone.reshape(left.size, 2, -1)
     maxima[two], maxima[two + 1] = pairs[two, 0], pairs[two, 1]
+    _run_longer(rows, maxima, run, is_end, number > 2)
+    return pairs
 
-    # Longer parts, then those with gaps that these motions may close
-    waiting = number > 2
+
+def _run_longer(
+    rows: BuildingRows,
+    maxima: FloatArray,
+    run: Callable[[BuildingRows], FloatArray],
+    is_end: BoolArray,
+    waiting: BoolArray,
+) -> None:
+    """Fill in the maxima of the parts that wait, and of those with gaps that motions may close."""
     while True:
         if waiting.any():
             maxima[waiting] = run(parts_of(rows, is_end, waiting))
         closes = is_end & ~stays_open(rows, maxima[:, 0])
         if not closes.any():
-            return pairs
-        is_end &= ~closes
-        waiting = _in_parts_of(is_end, closes)
+            return
+        is_end = is_end & ~closes
+        waiting = _counted(is_end, closes) > 0.0
 
 
-def _pairs_alone(
-    rows: BuildingRows,
-    maxima: FloatArray,
-    run: Callable[[BuildingRows], FloatArray],
-    left: IntArray,
-) -> FloatArray:
-    """Return the maxima of all buildings with the next ones, those of some pairs in contact."""
-    last = len(maxima) - 1
-    after = np.minimum(np.arange(1, len(maxima) + 1), last)
-    pairs = np.stack([maxima, maxima[after]], axis=1)
-    if left.size:
-        pairs[left] = run(_pairs_of(rows, left)).reshape(left.size, 2, -1)
-    return pairs
-
-
-def _pairs_of(rows: BuildingRows, left: IntArray) -> BuildingRows:
-    """Return some buildings, each with the next one, as rows of two."""
-    both = np.stack([left, left + 1], axis=1).ravel()
-    fields = {name: getattr(rows, name)[both] for name in BUILDING_FIELDS}
-    azimuth = np.repeat(rows.azimuth, np.diff(rows.first))[left]
-    return with_ends(BuildingRows(2 * np.arange(left.size + 1), **fields, azimuth=azimuth))
-
-
-def _part_of(is_end: BoolArray) -> IntArray:
-    """Return the number of the part of each building."""
-    return np.append(0, np.cumsum(is_end[:-1]))
-
-
-def _number_in_part(is_end: BoolArray) -> IntArray:
-    """Return the number of buildings in the part of each building."""
-    part = _part_of(is_end)
-    return np.bincount(part)[part]
-
-
-def _in_parts_of(is_end: BoolArray, some: BoolArray) -> BoolArray:
-    """Return the buildings of all parts with some of the buildings."""
-    part = _part_of(is_end)
-    return np.bincount(part, weights=some)[part] > 0.0
+def _counted(is_end: BoolArray, some: BoolArray) -> FloatArray:
+    """Return how many of some buildings are in the part of each building."""
+    part = np.append(0, np.cumsum(is_end[:-1]))
+    counted: FloatArray = np.bincount(part, weights=some)[part]
+    return counted

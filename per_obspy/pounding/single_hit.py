@@ -205,3 +205,14 @@ def _run(arguments: FloatArray) -> tuple[NDArray[np.int8], FloatArray, FloatArra
     # Threads take large shares of the pairs
     map_in_threads(fill, range(0, status.size, SHARE))
     return status[:count], fields[..., :count], envelope[:, :count]
+
+
+def amplification_target(name: str, values: ArrayLike) -> FloatArray:
+    """Return checked amplifications of at least 1."""
+    target = checks.finite(name, values)
+    if np.any(target < 1.0):
+        raise ValueError(
+            f"{name} must be at least 1 (the radius before impact is reached anyway), "
+            f"got {target.min()}"
+        )
+    return target

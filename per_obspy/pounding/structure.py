@@ -1,8 +1,10 @@
-"""A building as the single-degree-of-freedom structure that pounding sees: at its contact level."""
+"""Buildings as single-degree-of-freedom structures at their contact level, one or many pairs."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from math import inf, pi
+from math import inf, pi, prod
+
+import numpy as np
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -70,19 +72,7 @@ _CHECKS = {
 
 
 def refuse_bilinear(structures: Iterable[Structure]) -> None:
-    """
-    Refuse structures that yield.
-
-    Parameters
-    ----------
-    structures : iterable of Structure
-        Arguments of a function for linear structures.
-
-    Raises
-    ------
-    ValueError
-        If a yield displacement is finite.
-    """
+    """Raise ``ValueError`` if a structure yields, in a function for linear ones."""
     for structure in structures:
         if structure.yield_displacement < inf:
             raise ValueError(
@@ -90,35 +80,68 @@ def refuse_bilinear(structures: Iterable[Structure]) -> None:
             )
 
 
-def checked_oscillators(
-    number: int, period: ArrayLike, damping: ArrayLike, participation: ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+@dataclass(frozen=True)
+class Pairs:
     """
-    Return circular frequency, damping and participation of many structures 1 or 2, checked.
+    Many pairs of structures at their contact level, each number checked once.
 
-    Parameters
-    ----------
-    number : int
-        1 or 2, by which messages name the arguments.
-    period : array_like
-        Undamped periods, s.
-    damping : array_like
-        Fractions of critical, dimensionless.
-    participation : array_like
-        Contact displacement over oscillator displacement, dimensionless.
-
-    Returns
-    -------
-    frequency, damping, participation : ndarray
-        In rad/s and dimensionless, each in the shape of its argument.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
+    Fields of structures are (2, n_pairs), in the units of `Structure`; ``gap`` (m), ``restitution``
+    and ``azimuth`` (of the axis from 1 to 2, degrees clockwise from north) are (n_pairs,).
+    ``shape`` is that to which the arguments broadcast, of as many pairs.
     """
-    return (
-        2.0 * pi / checks.positive(f"period_{number}", period),
-        checks.fraction_of_critical(f"damping_{number}", damping),
-        checks.not_negative(f"participation_{number}", participation),
-    )
+
+    shape: tuple[int, ...]
+    period: FloatArray
+    damping: FloatArray
+    mass: FloatArray
+    yield_displacement: FloatArray
+    hardening: FloatArray
+    participation: FloatArray
+    gap: FloatArray
+    restitution: FloatArray
+    azimuth: FloatArray
+
+    @classmethod
+    def of(cls, **arguments: ArrayLike) -> "Pairs":
+        """
+        Check arguments, named ``period_1``, ``gap`` and the like, and broadcast them.
+
+        Fields without an argument are those of plain linear structures of unit mass.
+        """
+        # In the order in which they are given
+        checked = {}
+        for name, values in arguments.items():
+            checked[name] = PAIR_CHECKS[name.rstrip("_12")](name, values)
+        shape = np.broadcast_shapes(*(values.shape for values in checked.values()))
+
+        # One row per structure, or one number per pair
+        fields = {}
+        for name in PAIR_CHECKS:
+            names = [f"{name}_1", f"{name}_2"] if name in _CHECKS else [name]
+            rows = [np.broadcast_to(checked[one], shape).ravel() for one in names if one in checked]
+            default = np.broadcast_to(_DEFAULTS.get(name, 0.0), (len(names), prod(shape)))
+            lines = np.stack(rows) if rows else default
+            fields[name] = lines if name in _CHECKS else lines[0]
+        return cls(shape, **fields)
+
+    @property
+    def frequency(self) -> FloatArray:
+        """Undamped circular frequencies of the elastic branches, (2, n_pairs), rad/s."""
+        return 2.0 * pi / self.period
+
+    @property
+    def oscillators(self) -> FloatArray:
+        """Circular frequency, damping and participation of 1, then of 2, (6, n_pairs)."""
+        rows = np.stack([self.frequency, self.damping, self.participation], axis=1)
+        return rows.reshape(6, -1)
+
+
+_DEFAULTS = {"mass": 1.0, "yield_displacement": inf, "participation": 1.0}
+
+#: Check of each argument of pairs; those of one structure end with its number
+PAIR_CHECKS: dict[str, Callable[[str, ArrayLike], FloatArray]] = {
+    **_CHECKS,
+    "gap": checks.not_negative,
+    "restitution": lambda name, values: checks.between(name, values, 0.0, 1.0),
+    "azimuth": checks.finite,
+}

@@ -11,7 +11,7 @@ from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
-from per_obspy.pounding.single_hit import single_hit
+from per_obspy.pounding.single_hit import amplification_target, single_hit
 from per_obspy.spectra.elastic import per_spectrum
 from per_obspy.spectra.trace_arguments import takes_trace
 
@@ -203,11 +203,7 @@ def required_gap(
     >>> print(f"{gap:.3f} m")
     0.479 m
     """
-    target = checks.number("target", target, checks.positive)
-    if target < 1.0:
-        raise ValueError(
-            f"target must be at least 1 (the radius before impact is reached anyway), got {target}"
-        )
+    target = checks.number("target", target, amplification_target)
     pair = per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, critical_gap
 
     def exceeds(gaps: FloatArray) -> NDArray[np.bool_]:
@@ -225,17 +221,8 @@ def required_gap(
     if single_hit(*pair, gaps[0]).status not in ("ok", "no_pounding"):
         return float("nan")
 
-    # Bisect between the largest gap that fails and the next one
-    return _end_of_excess(exceeds, gaps[failing[-1]], gaps[failing[-1] + 1])
-
-
-def _end_of_excess(
-    exceeds: Callable[[FloatArray], NDArray[np.bool_]], low: float, high: float
-) -> float:
-    """Bisect down to neighbouring numbers: the low gap exceeds the target, the high one not."""
+    # Bisect to neighbouring numbers between the largest gap that fails and the next one
+    low, high = gaps[failing[-1]], gaps[failing[-1] + 1]
     while (middle := 0.5 * (low + high)) not in (low, high):
-        if exceeds(np.array([middle]))[0]:
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if exceeds(middle) else (low, middle)
     return float(high)

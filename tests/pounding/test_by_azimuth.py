@@ -107,7 +107,7 @@ def test_results_do_not_depend_on_the_company(pairs):
 
 
 @pytest.mark.parametrize(("east", "damping_1", "message"), [
-    (EAST[1:], 0.05, "east must have the 1500 samples of north, got 1499"),
+    (EAST[1:], 0.05, "north and east must be equally long, got 1500 and 1499"),
     (EAST, 5.0, "damping_1 must be at least 0 and below 1, got 5"),
 ])  # fmt: skip
 def test_bad_arguments_are_named(east, damping_1, message):

@@ -8,10 +8,7 @@ from scipy.integrate import dblquad
 from scipy.stats import norm
 
 from per_obspy.pounding.critical_gap import critical_gap
-from per_obspy.pounding.probability import (
-    demand_probability,
-    pounding_probability,
-)
+from per_obspy.pounding.probability import pounding_probability
 
 CASES = [
     (0.2, 0.1, 0.0, 0.25, 0.4, 0.4, 0.5, 0.1, 0.1), (0.2, 0.2, 0.99, 0.02, 0.4, 0.4, 0.8, 0.0, 0.0),
@@ -134,14 +131,6 @@ def test_certainty_walls_and_touching_pairs():
     assert pounding_probability(0.3, 0.4, 0.0, np.hypot(0.3, 0.5), 0.0, 0.3, 0.0) == pytest.approx(
         expected, abs=1e-9
     )
-
-
-def test_demand_of_a_record():
-    np.testing.assert_allclose(
-        demand_probability(0.2, [0.1, 0.2, 0.4], 0.3), norm.cdf(np.log([2.0, 1.0, 0.5]) / 0.3)
-    )
-    assert demand_probability([0.2, 0.0, 0.0], [0.0, 0.1, 0.0], 0.3).tolist() == [1.0, 0.0, 0.0]
-    assert demand_probability([0.2, 0.1], 0.15, 0.0).tolist() == [1.0, 0.0]
 
 
 def test_first_order_is_close_only_for_unlike_radii():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from per_obspy.pounding.structure import Structure, checked_oscillators, refuse_bilinear
+from per_obspy.pounding.structure import PAIR_CHECKS, Pairs, Structure, refuse_bilinear
 
 GOOD = {"period": 1.0, "damping": 0.05, "mass": 1.0}
 
@@ -51,9 +51,19 @@ def test_structures_that_yield_are_refused_where_only_linear_ones_belong():
         refuse_bilinear([linear, bilinear])
 
 
-def test_arrays_of_structures():
-    frequency, damping, participation = checked_oscillators(1, [1.0, 2.0], 0.05, 1.2)
-    np.testing.assert_allclose(frequency, [2.0 * np.pi, np.pi])
-    assert (damping, participation) == (0.05, 1.2)
-    with pytest.raises(ValueError, match="damping_2"):
-        checked_oscillators(2, 1.0, 1.0, 1.0)
+def test_arguments_broadcast_to_one_value_per_pair():
+    # mutation: structures exchanged, a default of another field
+    pairs = Pairs.of(period_1=[[1.0], [2.0]], gap=[0.1, 0.2, 0.3], mass_2=5.0, mass_1=4.0)
+    assert pairs.shape == (2, 3)
+    assert pairs.gap.tolist() == [0.1, 0.2, 0.3] * 2
+    assert (pairs.mass[:, 0].tolist(), pairs.mass.shape) == ([4.0, 5.0], (2, 6))
+    assert np.isinf(pairs.yield_displacement).all()
+    assert (pairs.participation == 1.0).all()
+
+
+@pytest.mark.parametrize("name", PAIR_CHECKS)
+def test_every_argument_of_pairs_is_checked_under_its_own_name(name):
+    # mutation: a check left out, the name of structure 1 for structure 2
+    for argument in (name, f"{name}_2"):
+        with pytest.raises(ValueError, match=rf"^{argument} "):
+            Pairs.of(**{argument: np.nan})

@@ -15,6 +15,7 @@ from per_obspy.kernels.pounding_lanes.lanes import sweep_tile
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair, write_constants, write_phase
 from per_obspy.pounding.kernel_tables import pair_table, row_at_rest
+from per_obspy.pounding.structure import Pairs
 
 LINEAR = {
     "period_1": 0.9, "damping_1": 0.05, "mass_1": 2.0,
@@ -27,7 +28,7 @@ LINEAR = {
 
 def lane_of(fields, duration, yielding=0.0):
     """Return the numbers of the lane of a pair at rest, of which bilinear structures may yield."""
-    table = pair_table({name: np.array([value]) for name, value in fields.items()})
+    table = pair_table(Pairs.of(**{name: [value] for name, value in fields.items()}))
     row = row_at_rest(table, np.array([[fields["gap"]]]), np.array([[0.5]]))[0]
     row[:, motion.PHASE] = np.where(row[:, motion.YIELD] < math.inf, yielding, 0.0)
     # along the north component
