@@ -30,6 +30,13 @@ class Table(Protocol):
         """Return a column."""
 
 
+#: Truth values and row numbers.
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.intp]
+
+#: Of building 1 and building 2.
+Both = tuple[FloatArray, FloatArray]
+
 #: A table as plain arrays.
 Columns = dict[str, NDArray[Any]]
 

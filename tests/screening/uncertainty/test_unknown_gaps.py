@@ -37,7 +37,7 @@ def station():
 
 def risk(station, gap, exact=True, building=None):
     """Return the risk table of all kinds of pairs with one gap, by pair."""
-    screening = Screening(exact=exact, codes=Codes(fema_seismicity="high"))
+    screening = Screening(exact=exact, codes=Codes(gb_intensity=8))
     pairs = make_pairs([{**kind, "gap": gap} for kind in KINDS])
     table = per_obspy.risk_table(station, pairs, building or Building(), screening)
     return table.set_index("pair_id").sort_index()
