@@ -7,7 +7,6 @@ All quantities are at contact level: a building's radius times its participation
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import ddc_correlation
@@ -21,7 +20,7 @@ from per_obspy.screening.by_record.yielding import (
     linearized_columns,
 )
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import Columns, Table, both, values
+from per_obspy.screening.values import BoolArray, Both, Columns, Table, TextArray, both, values
 
 
 class GapEstimates(NamedTuple):
@@ -58,17 +57,17 @@ class Demand(NamedTuple):
     """
 
     demand: FloatArray
-    rule: NDArray[np.object_]
+    rule: TextArray
 
 
 RULES = np.array(["per_white_noise", "per_record", "srss"], dtype=object)
 
 
 def gap_estimates(
-    per: tuple[FloatArray, FloatArray],
-    sd: tuple[FloatArray, FloatArray],
-    period: tuple[FloatArray, FloatArray],
-    damping: tuple[FloatArray, FloatArray],
+    per: Both,
+    sd: Both,
+    period: Both,
+    damping: Both,
     correlation_record: FloatArray,
 ) -> GapEstimates:
     """
@@ -94,7 +93,7 @@ def gap_estimates(
     )
 
 
-def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_]) -> Demand:
+def governing_demand(estimates: GapEstimates, period_derived: BoolArray) -> Demand:
     """
     Return the larger PER demand of eq. (16) and of the record; with derived periods at least SRSS.
 
@@ -113,14 +112,6 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
     )
     best = np.argmax(candidates, axis=0)
     return Demand(np.take_along_axis(candidates, best[None], axis=0)[0], RULES[best])
-
-
-def demand_ratio(gap: FloatArray, demand: FloatArray) -> FloatArray:
-    """Return gap / demand: 0 for touching pairs, NaN (an empty cell) where the demand is 0."""
-    ratio: FloatArray = np.divide(
-        gap, demand, out=np.full(np.shape(demand), np.nan), where=demand > 0
-    )
-    return ratio
 
 
 #: Demand / sum of the radii below which two oscillators move as one: the difference of equal
@@ -159,8 +150,8 @@ def demand_columns(
     table |= linearized_columns(station, table)
     table |= _estimated_demand(table)
     table |= {"demand_estimated": table["demand"], "estimate_rule": table["demand_rule"]}
-    # the single hit at the estimated demand
-    table |= _single_hits(table)
+    # the single hit of the oscillators whose gap governs: if yielding, maybe the equivalent ones
+    table |= single_hit_columns(table, governing_radii(table), governing(table, "period"))
     table["azimuth_rule"] = np.full(count, azimuth_rule, dtype=object)
     # the exact demand replaces the estimate where the record supports it
     if exact:
@@ -248,13 +239,11 @@ def _estimates(motion: PairMotion, pairs: Table) -> GapEstimates:
     )
 
 
-def _single_hits(table: Table) -> Columns:
-    """Return the single hit of every pair, with the estimated demand as its critical gap."""
-    # oscillators of the model whose gap governs: of yielding buildings maybe the equivalent ones
-    radii, periods = governing_radii(table), governing(table, "period")
-    masses = both(table, "contact_mass")
-    restitution, demand = values(table, "restitution"), values(table, "demand")
-    hit = single_hit(*radii, *periods, *masses, restitution, demand, values(table, "gap"))
+def single_hit_columns(table: Table, radii: Both, periods: Both) -> Columns:
+    """Return the single hit of every pair, with its ``demand`` as the critical gap."""
+    masses, restitution = both(table, "contact_mass"), values(table, "restitution")
+    demand, gap = values(table, "demand"), values(table, "gap")
+    hit = single_hit(*radii, *periods, *masses, restitution, demand, gap)
     return {
         "single_hit_status": hit.status,
         "amplification_1": hit.amplification_1,

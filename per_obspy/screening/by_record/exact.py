@@ -12,7 +12,6 @@ the pair's azimuth, or along the worst one where that is unknown.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import worst_azimuth
@@ -26,7 +25,17 @@ from per_obspy.pounding.relative import (
 )
 from per_obspy.screening.by_record.station_motion import StationMotion
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, only, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    Columns,
+    Table,
+    at_contact,
+    both,
+    chosen,
+    only,
+    values,
+)
 
 #: Columns of :func:`exact_outcome`.
 EXACT_COLUMNS = (
@@ -74,7 +83,7 @@ def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
     return worst_azimuth(*motion, period_1, damping_1, period_2, damping_2, *shares)
 
 
-def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
+def exact_decides(station: StationMotion, pairs: Table) -> BoolArray:
     """
     Return a mask of the pairs whose demand is the exact one.
 
@@ -91,7 +100,7 @@ def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     return np.asarray(record_supports(station, pairs) & ~period_is_derived(pairs))
 
 
-def record_supports(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
+def record_supports(station: StationMotion, pairs: Table) -> BoolArray:
     """
     Return a mask of the pairs for which the record gives an exact demand.
 
@@ -111,11 +120,11 @@ def record_supports(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     # the worst azimuth of a bilinear pair is unknown
     directed = ~can_yield(pairs) | np.isfinite(values(pairs, "azimuth"))
     two_horizontals = station.horizontals == 2
-    supports: NDArray[np.bool_] = usable & directed & two_horizontals
+    supports: BoolArray = usable & directed & two_horizontals
     return supports
 
 
-def can_yield(pairs: Table) -> NDArray[np.bool_]:
+def can_yield(pairs: Table) -> BoolArray:
     """Return a mask of the pairs in which a building has a yield displacement."""
     return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
 
@@ -158,7 +167,7 @@ def _pounding_columns(
     table: Table,
     azimuth: FloatArray,
     demand: FloatArray,
-    radii: tuple[FloatArray, FloatArray],
+    radii: Both,
 ) -> Columns:
     """
     Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
@@ -355,7 +364,7 @@ def _refined(
     return refined
 
 
-def _fits(station: StationMotion, table: Table, added: FloatArray) -> NDArray[np.bool_]:
+def _fits(station: StationMotion, table: Table, added: FloatArray) -> BoolArray:
     """Return a mask of the pairs whose exact demand with the added damping is at most the gap."""
     damping_1, damping_2 = both(table, "damping")
     damped = {name: table[name] for name in table}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import directional_correlation
-from per_obspy.screening.values import Table, both, components, number, values
+from per_obspy.screening.values import Both, IndexArray, Table, both, components, number, values
 from per_obspy.spectra.azimuthal import (
     EVERY_AZIMUTH,
     azimuthal_per_spectrum,
@@ -43,20 +43,18 @@ class LogSpectra(NamedTuple):
     radii: FloatArray
 
 
-def log_oscillator(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+def log_oscillator(table: Table, i: int) -> Both:
     """Return ln period and ln damping of building i."""
     return log_period_and_damping(values(table, f"period_{i}"), values(table, f"damping_{i}"))
 
 
-def log_period_and_damping(
-    period: FloatArray, damping: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def log_period_and_damping(period: FloatArray, damping: FloatArray) -> Both:
     """Return ln period and ln damping, in s and fractions of critical."""
     return np.log(period), np.log(np.maximum(damping, SMALLEST_DAMPING))
 
 
 def stored_log(
-    spectra: LogSpectra, row: NDArray[np.intp], log_period: FloatArray, log_damping: FloatArray
+    spectra: LogSpectra, row: IndexArray, log_period: FloatArray, log_damping: FloatArray
 ) -> FloatArray:
     """
     Interpolate stored logarithms at (ln period, ln damping); constant beyond the grid.
@@ -90,7 +88,7 @@ def stored_log(
     return stored
 
 
-def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[IndexArray, FloatArray]:
     """Return the lower neighbour on a grid, and the fraction towards the next one, 0 to 1."""
     if grid.size == 1:
         return np.zeros(points.shape, dtype=np.intp), np.zeros(points.shape)
@@ -165,11 +163,11 @@ def station_motion(station: xr.Dataset) -> StationMotion:
     )
 
 
-def nearest_azimuth(station: StationMotion, table: Table) -> NDArray[np.intp]:
+def nearest_azimuth(station: StationMotion, table: Table) -> IndexArray:
     """Return the row of the stored azimuth nearest to ``azimuth_used`` of each pair."""
     count = station.azimuths.size
     azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
-    row: NDArray[np.intp] = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+    row: IndexArray = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
     return row
 
 
@@ -212,8 +210,8 @@ class PairMotion(NamedTuple):
     """
 
     azimuth: FloatArray
-    per: tuple[FloatArray, FloatArray]
-    sd: tuple[FloatArray, FloatArray]
+    per: Both
+    sd: Both
     correlation: FloatArray
 
 
@@ -262,7 +260,7 @@ def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMoti
     )
 
 
-def _oscillators(pairs: Table) -> list[tuple[FloatArray, FloatArray]]:
+def _oscillators(pairs: Table) -> list[Both]:
     """Return period and damping of buildings 1 and of buildings 2."""
     return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
 
@@ -274,9 +272,7 @@ def _correlation(station: StationMotion, pairs: Table, azimuths: FloatArray) -> 
     return directional_correlation(*motion, *first, *second, azimuths)
 
 
-def _every_radius(
-    station: StationMotion, periods: FloatArray, dampings: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _every_radius(station: StationMotion, periods: FloatArray, dampings: FloatArray) -> Both:
     """Return PER and SD along every azimuth, (n, 180); equal oscillators are computed once."""
     motion = station.north, station.east, station.dt
     per, sd = np.empty((2, periods.size, EVERY_AZIMUTH.size))

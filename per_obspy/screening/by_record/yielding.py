@@ -15,7 +15,6 @@ smaller of the elastic and the equivalent correlation is used.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import ddc_correlation
@@ -29,7 +28,16 @@ from per_obspy.screening.by_record.station_motion import (
     nearest_azimuth,
     stored_log,
 )
-from per_obspy.screening.values import Columns, Table, both, chosen, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    Columns,
+    IndexArray,
+    Table,
+    both,
+    chosen,
+    values,
+)
 
 #: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
@@ -61,13 +69,13 @@ class Equivalent(NamedTuple):
     period: FloatArray
     damping: FloatArray
     per: FloatArray
-    converged: NDArray[np.bool_]
+    converged: BoolArray
 
 
 class _Building(NamedTuple):
     """Buildings of one side: row of the stored azimuth, period (s), damping (of critical)."""
 
-    row: NDArray[np.intp]
+    row: IndexArray
     period: FloatArray
     damping: FloatArray
 
@@ -116,7 +124,7 @@ def linearized_columns(station: StationMotion, table: Table) -> Columns:
     return columns
 
 
-def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
+def governing(table: Table, name: str) -> Both:
     """
     Return a property of the two oscillators that govern the estimated demand.
 
@@ -139,7 +147,7 @@ def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     return first, np.where(linearized, equivalent_2, elastic_2)
 
 
-def governing_radii(table: Table) -> tuple[FloatArray, FloatArray]:
+def governing_radii(table: Table) -> Both:
     """Return the PER of the oscillators of :func:`governing` at contact height, m."""
     radius_1, radius_2 = governing(table, "per")
     share_1, share_2 = both(table, "participation")
@@ -198,7 +206,7 @@ def _equivalent_correlation(
     return correlation
 
 
-def _equivalent(station: StationMotion, row: NDArray[np.intp], table: Table, i: int) -> Equivalent:
+def _equivalent(station: StationMotion, row: IndexArray, table: Table, i: int) -> Equivalent:
     """Return the equivalent linear buildings i; elastic ones stay unchanged."""
     elastic = _elastic_ductility(table, i)
     period, damping = values(table, f"period_{i}"), values(table, f"damping_{i}")
@@ -232,7 +240,7 @@ def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> 
 
 def _largest_ductility(
     sd: LogSpectra, building: _Building, elastic: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Return the largest ductility that the displacement reaches, and whether it was found."""
 
     def excess(ductility: FloatArray) -> FloatArray:
