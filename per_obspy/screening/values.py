@@ -75,10 +75,15 @@ def both(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     return values(table, f"{name}_1"), values(table, f"{name}_2")
 
 
+def oscillators(table: Table) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return period, s, and damping of building 1, then those of building 2."""
+    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
+    return period_1, damping_1, period_2, damping_2
+
+
 def pair_correlation(table: Table) -> FloatArray:
     """Return the correlation of both responses to white noise by eq. (16)."""
-    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
-    return np.asarray(ddc_correlation(period_1, damping_1, period_2, damping_2))
+    return np.asarray(ddc_correlation(*oscillators(table)))
 
 
 def at_contact(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
