@@ -157,11 +157,6 @@ class Codes(Section):
     italy_ground: float | None = Field(
         None, gt=0, le=2, description="a_g S of the life safety limit state of NTC Italy 2018, in g"
     )
-    fema_seismicity: str | None = Field(
-        None,
-        pattern="^(very_high|high|moderately_high|lower)$",
-        description="seismicity of the region by FEMA P-154",
-    )
     floor_tolerance: float = Field(
         FLOOR_TOLERANCE,
         ge=0,

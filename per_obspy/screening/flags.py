@@ -4,13 +4,12 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from per_obspy.config import Screening
 from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.columns import FLAGS, RECORD_FLAGS
-from per_obspy.screening.values import Table, both, number, values
+from per_obspy.screening.values import BoolArray, Table, TextArray, both, number, values
 from per_obspy.spectra.station import lacks_azimuths
 
 #: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it
@@ -19,7 +18,7 @@ from per_obspy.spectra.station import lacks_azimuths
 UNRELIABLE_SINGLE_HIT = 0.6
 
 
-def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
+def period_is_derived(pairs: Table) -> BoolArray:
     """Return a mask of pairs with a period derived from height or storeys."""
     derived = np.asarray(pairs["derived"], dtype=object).tolist()
     # Many rows share few different texts: each text is searched once
@@ -27,12 +26,12 @@ def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
     return np.fromiter(map(has_period.__getitem__, derived), bool, len(derived))
 
 
-def joined_flags(raised: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]:
+def joined_flags(raised: Mapping[str, BoolArray]) -> TextArray:
     """Join the names of the flags of each row, in the order of ``FLAGS``, with blanks."""
     return joined_names({name: raised[name] for name in FLAGS if name in raised})
 
 
-def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
+def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
     """Return a mask of rows per flag that needs no record."""
     gap = values(table, "gap")
     # Tables that are computed for a screening have a gap in every row, and a mark
@@ -56,7 +55,7 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def _named_in(odd: Iterable[str]) -> dict[str, NDArray[np.bool_]]:
+def _named_in(odd: Iterable[str]) -> dict[str, BoolArray]:
     """Return a mask of rows per suspicion of the pair table."""
     # Most rows have none
     texts = np.asarray(odd, dtype=object)
@@ -69,7 +68,7 @@ def _named_in(odd: Iterable[str]) -> dict[str, NDArray[np.bool_]]:
 
 def raised_by_record(
     table: Table, station: xr.Dataset, screening: Screening
-) -> dict[str, NDArray[np.bool_]]:
+) -> dict[str, BoolArray]:
     """Return a mask of rows per flag of the record."""
     every = np.ones(len(table["distance"]), dtype=bool)
     # Only tables with motion between stations have this column
@@ -100,7 +99,7 @@ def record_flags(station: xr.Dataset) -> list[str]:
     return [flag for flag in RECORD_FLAGS if flag in noted]
 
 
-def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.bool_]:
+def _outside_usable_periods(table: Table, station: xr.Dataset) -> BoolArray:
     """Return a mask of pairs with a period outside the usable periods of the record."""
     periods = np.stack(both(table, "period"))
     shortest = number(station, "shortest_usable_period")
@@ -108,7 +107,7 @@ def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.boo
     return np.asarray(((periods < shortest) | (periods > longest)).any(axis=0))
 
 
-def _per_far_above_sd(table: Table, limit: float) -> NDArray[np.bool_]:
+def _per_far_above_sd(table: Table, limit: float) -> BoolArray:
     """Return a mask of pairs in which a building has PER / SD above a limit."""
     per, sd = np.stack(both(table, "per")), np.stack(both(table, "sd"))
     return np.asarray((per > limit * sd).any(axis=0))

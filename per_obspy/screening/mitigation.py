@@ -11,7 +11,6 @@ damping is added.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.added_damping import least_dampings
@@ -21,7 +20,16 @@ from per_obspy.pounding.critical_gap import critical_gap, srss_gap
 from per_obspy.screening.by_record.exact import NEEDED, least_exact_damping
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth, stored_log
 from per_obspy.screening.by_record.yielding import governing, governing_radii
-from per_obspy.screening.values import Columns, Table, both, chosen, only, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Columns,
+    IndexArray,
+    Table,
+    both,
+    chosen,
+    only,
+    values,
+)
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4
@@ -111,7 +119,7 @@ def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
     return added
 
 
-def _estimated_gap(table: Table) -> tuple[NDArray[np.bool_], FloatArray]:
+def _estimated_gap(table: Table) -> tuple[BoolArray, FloatArray]:
     """Return a mask of uncorrelated pairs, and the critical gap by eq. (15) or SRSS, m."""
     period_1, period_2 = governing(table, "period")
     damping_1, damping_2 = governing(table, "damping")
@@ -124,9 +132,7 @@ def _estimated_gap(table: Table) -> tuple[NDArray[np.bool_], FloatArray]:
     return uncorrelated, np.where(uncorrelated, srss_gap(*radii), correlated)
 
 
-def _stored_by_damping(
-    station: StationMotion, row: NDArray[np.intp], period: FloatArray
-) -> FloatArray:
+def _stored_by_damping(station: StationMotion, row: IndexArray, period: FloatArray) -> FloatArray:
     """Return the stored ln PER at the period of each pair and every stored damping."""
     return stored_log(station.per, row, np.log(period)[:, None], station.per.dampings)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.config import States
+from per_obspy.config import Screening, States
 from per_obspy.config.screening import EVERY_STATE as EVERY_STATE
 from per_obspy.config.screening import STATES as STATES
 from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
+from per_obspy.screening.values import Columns, IndexArray, TextArray, values
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
 KEYS = (
@@ -21,7 +21,7 @@ KEYS = (
 )
 
 
-def pounding_state(probability: FloatArray, states: States) -> NDArray[np.object_]:
+def pounding_state(probability: FloatArray, states: States) -> TextArray:
     """
     Return the state of each pair, by its probability of contact alone.
 
@@ -46,7 +46,7 @@ def pounding_state(probability: FloatArray, states: States) -> NDArray[np.object
     return _first_reached(probability, named | {STATES[-1]: 0.0})
 
 
-def risk_class(velocity: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
+def risk_class(velocity: FloatArray, classes: dict[str, float]) -> TextArray:
     """
     Return the first class whose threshold an expected impact velocity reaches.
 
@@ -70,12 +70,27 @@ def risk_class(velocity: FloatArray, classes: dict[str, float]) -> NDArray[np.ob
     return _first_reached(velocity, classes)
 
 
-def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> NDArray[np.object_]:
+def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
+    """
+    Return gap over demand, state and risk class of rows; the population alone decides the latter.
+
+    The ratio is 0 for touching pairs and NaN (an empty cell) where the demand is 0.
+    """
+    gap, demand = values(table, "gap"), values(table, "demand")
+    nothing = np.full(demand.shape, np.nan)
+    return {
+        "demand_ratio": np.divide(gap, demand, out=nothing, where=demand > 0),
+        "state": pounding_state(values(table, "probability"), screening.states),
+        "risk_class": risk_class(values(table, "expected_impact_velocity"), screening.classes),
+    }
+
+
+def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> TextArray:
     """Return the name of the largest threshold that each number reaches."""
     names = np.array(list(thresholds), dtype=object)
     falling = np.array(list(thresholds.values()))
     index = np.searchsorted(-falling, -numbers, side="left")
-    first: NDArray[np.object_] = names[np.minimum(index, names.size - 1)]
+    first: TextArray = names[np.minimum(index, names.size - 1)]
     return first
 
 
@@ -124,9 +139,7 @@ def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
     return dict(zip(KEYS, keys, strict=True))
 
 
-def _ties_by_name(
-    order: NDArray[np.intp], badness: FloatArray, names: NDArray[np.object_]
-) -> NDArray[np.intp]:
+def _ties_by_name(order: IndexArray, badness: FloatArray, names: TextArray) -> IndexArray:
     """Sort rows with equal keys by name."""
     # Names are compared only within ties, for that takes time
     repeats = np.zeros(order.size, dtype=bool)

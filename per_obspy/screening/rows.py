@@ -9,14 +9,13 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 from pandas.api.types import is_numeric_dtype
 
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.suspicions import ODD
-from per_obspy.screening.by_record.estimates import demand_columns, demand_ratio
+from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.by_record.station_motion import (
     PairMotion,
@@ -26,7 +25,7 @@ from per_obspy.screening.by_record.station_motion import (
     motion_of_one_horizontal,
     station_motion,
 )
-from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback
+from per_obspy.screening.by_spectrum.shakemap import shakemap_rows
 from per_obspy.screening.codes import code_columns, rule_columns
 from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
 from per_obspy.screening.flags import (
@@ -37,10 +36,10 @@ from per_obspy.screening.flags import (
 from per_obspy.screening.ground_motion.assignment import assigned
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion_at_pairs
 from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.ranking import KEYS, pounding_state, risk_class
+from per_obspy.screening.ranking import KEYS, state_columns
 from per_obspy.screening.uncertainty.exact_demand import record_population
 from per_obspy.screening.uncertainty.unknown_gaps import kept_apart, without_gap
-from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
+from per_obspy.screening.values import Columns, IndexArray, at_contact, chosen, joined, values
 from per_obspy.spectra.station import lacks_azimuths
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -89,7 +88,8 @@ def risk_rows(
         tables.append(_rows_at_stations(placed.reset_index(drop=True), ground, screening))
     # pairs without a station in reach fall back on the map
     if ground.shakemap is not None and rejected:
-        mapped, rejected = shakemap_fallback(ground.shakemap, complete, rejected, screening)
+        rest = complete[complete["pair_id"].isin([rejection.name for rejection in rejected])]
+        mapped, rejected = shakemap_rows(ground.shakemap, rest, screening, rejected)
         tables += [mapped] if len(mapped) else []
     if not tables:
         return _ordered(placed.reindex(columns=[*ORDER])), rejected
@@ -150,7 +150,7 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
 
 def _motions(
     station: StationMotion, pairs: Columns, exact: bool
-) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
+) -> Iterator[tuple[IndexArray, PairMotion, str]]:
     """Yield rows of pairs with their motion and the rule by which their azimuth is found."""
     azimuth = values(pairs, "azimuth")
     if station.horizontals == 1:
@@ -179,12 +179,7 @@ def _motions(
 
 def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the table with all columns that need no record: state, class, flags, code rules."""
-    gap, demand = values(table, "gap"), values(table, "demand")
-    # the population alone decides state and class
-    state = pounding_state(values(table, "probability"), screening.states)
-    named = risk_class(values(table, "expected_impact_velocity"), screening.classes)
-    ratio = demand_ratio(gap, demand)
-    table = table.assign(demand_ratio=ratio, state=state, risk_class=named)
+    table = table.assign(**state_columns(table, screening))
     # flags of the record and of the pairs, joined to one text
     by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}
     raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}

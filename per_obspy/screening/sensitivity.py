@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
@@ -23,7 +22,7 @@ from per_obspy.screening.uncertainty.population import (
     one_wall_chance,
 )
 from per_obspy.screening.uncertainty.unknown_gaps import kept_apart
-from per_obspy.screening.values import values
+from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
 LOGNORMAL = ("period_1", "period_2", "damping_1", "damping_2")
@@ -35,7 +34,7 @@ TAIL = 0.16
 TOLERANCE = 0.005
 
 #: Lower and upper values of an input, and rows in which it is uncertain.
-Ends = tuple[FloatArray, FloatArray, NDArray[np.bool_]]
+Ends = tuple[FloatArray, FloatArray, BoolArray]
 
 
 class Sensitivity(NamedTuple):
@@ -118,13 +117,13 @@ def _names(rows: pd.DataFrame, name: str, side: int) -> list[str]:
     return [f"{row} {name} {side}" for row in range(len(rows))]
 
 
-def _found(known: pd.DataFrame, name: str, found: pd.DataFrame) -> NDArray[np.bool_]:
+def _found(known: pd.DataFrame, name: str, found: pd.DataFrame) -> BoolArray:
     """Return which rows have an outcome at both values: a spectrum may not reach one of them."""
     ends = [pd.Index(_names(known, name, side)).isin(found.index) for side in (0, 1)]
     return np.asarray(ends[0] & ends[1])
 
 
-def _same(known: pd.DataFrame, found: pd.DataFrame) -> NDArray[np.bool_]:
+def _same(known: pd.DataFrame, found: pd.DataFrame) -> BoolArray:
     """Return which rows have the probability of the risk table when they are computed again."""
     again = found["probability"].reindex(_names(known, "", 0)).to_numpy(np.float64)
     # NaN of a pair that was rejected compares as false

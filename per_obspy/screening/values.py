@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.pounding.correlation import ddc_correlation
 
 
 class Table(Protocol):
@@ -29,6 +30,16 @@ class Table(Protocol):
     def __getitem__(self, name: str, /) -> Any:
         """Return a column."""
 
+
+#: Truth values and row numbers.
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.intp]
+
+#: Texts.
+TextArray = NDArray[np.object_]
+
+#: Of building 1 and building 2.
+Both = tuple[FloatArray, FloatArray]
 
 #: A table as plain arrays.
 Columns = dict[str, NDArray[Any]]
@@ -62,6 +73,17 @@ def values(table: Table, name: str) -> FloatArray:
 def both(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     """Return the columns of a property for buildings 1 and 2."""
     return values(table, f"{name}_1"), values(table, f"{name}_2")
+
+
+def oscillators(table: Table) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return period, s, and damping of building 1, then those of building 2."""
+    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
+    return period_1, damping_1, period_2, damping_2
+
+
+def pair_correlation(table: Table) -> FloatArray:
+    """Return the correlation of both responses to white noise by eq. (16)."""
+    return np.asarray(ddc_correlation(*oscillators(table)))
 
 
 def at_contact(table: Table, name: str) -> tuple[FloatArray, FloatArray]:

@@ -24,7 +24,7 @@ def screened(call, tmp_path):
     (tmp_path / "pairs.csv").write_text(PAIRS)
     (tmp_path / "design.toml").write_text(
         'spectrum = "code.csv"\npairs = "pairs.csv"\noutput = '
-        '"out"\n[screening.codes]\nfema_seismicity = "high"\n'
+        '"out"\n[screening.codes]\ngb_intensity = 8\n'
     )
 
     return lambda *arguments: call("screen", tmp_path / "design.toml", *arguments)
@@ -39,7 +39,7 @@ def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     assert columns.index.tolist() == list(table)
     carried = columns[columns.str.startswith("carried")].index.tolist()
     assert carried == ["owner"]
-    assert "FEMA P-154" in columns["required_gap_fema_p154_unverified"]
+    assert "GB 50011-2010" in columns["required_gap_gb50011_2010"]
     rejected = pd.read_csv(tmp_path / "out" / "rejected.csv")
     assert rejected["reasons"].tolist() == ["period_2 = 9 s is outside the spectrum's 0.1 to 4 s"]
     pd.testing.assert_frame_equal(

@@ -1,8 +1,4 @@
-"""
-Rules of codes against their clauses worked by hand, and empty cells where inputs lack.
-
-Covers per_obspy.screening.code_formulas too.
-"""
+"""Rules of codes against their clauses worked by hand, and empty cells where inputs lack."""
 
 import re
 from pathlib import Path
@@ -14,11 +10,9 @@ from numpy.testing import assert_allclose
 
 from per_obspy.config import Building, Codes
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.code_formulas import NTC_SHARE, NTC_SIMPLIFIED
-from per_obspy.screening.codes import code_columns, code_rules
+from per_obspy.screening.codes import NTC_SIMPLIFIED, code_columns, code_rules
 
-REGION = Codes(ntc_zone="III", gb_intensity=8, fema_seismicity="high")
-INCH = 0.0254
+REGION = Codes(ntc_zone="III", gb_intensity=8)
 
 
 def _pairs(**columns):
@@ -41,14 +35,11 @@ def _rule(name, pairs, displacement_1=0.03, displacement_2=0.04, codes=REGION):
 
 
 def test_every_column_is_in_the_table_of_rules_with_its_source():
-    # would catch a rule without a source, an unverified one without its label, and a stale row of
-    # the table
+    # would catch a rule without a source, and a stale row of the table
     rules = code_rules().set_index("column")
     columns = code_columns(_pairs(), [0.03], [0.04], REGION).columns
     assert columns.tolist() == rules.index.tolist()
-    assert set(rules["verified"]) == {"yes", "no"}
     for name, rule in rules.iterrows():
-        assert name.endswith("_unverified") == (rule["verified"] == "no")
         assert ("event_based" in name) == ("SD" in rule["inputs"])
         assert all(rule[["clause", "edition", "inputs", "source", "meaning"]])
 
@@ -59,33 +50,11 @@ def test_the_page_of_the_documentation_names_every_rule():
     assert named == code_rules()["column"].tolist()
 
 
-BY_PROPERTY = (
-    "required_gap_asce7_event_based",
-    "required_gap_asce7_22_event_based_unverified",
-    "required_gap_ec8_event_based_unverified",
-)
-
-
-@pytest.mark.parametrize("name", BY_PROPERTY[:2])
-def test_asce_adds_displacements_across_a_property_line(name):
-    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.05)
-    assert_allclose(_rule(name, _pairs(same_property="no")), 0.07)
-
-
-def test_eurocode_reduces_where_floors_align():
-    name = "required_gap_ec8_event_based_unverified"
-    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.7 * 0.05)
-    assert_allclose(_rule(name, _pairs(same_property="yes", floor_offset=1.0)), 0.05)
-    assert_allclose(_rule(name, _pairs(same_property="no")), 0.7 * 0.07)
-
-
-@pytest.mark.parametrize("name", BY_PROPERTY)
-def test_an_unknown_property_asks_for_the_larger_gap(name):
+def test_asce_adds_displacements_unless_both_buildings_are_known_to_be_one_property():
     # would catch a root of squares across a property line, which is up to 0.71 of the sum
-    one, two, empty = _rule(name, _pairs(same_property=["yes", "no", ""]))
-    (absent,) = _rule(name, _pairs())
-    assert empty == absent == two == max(one, two)
-    assert one < two
+    name = "required_gap_asce7_event_based"
+    given = _rule(name, _pairs(same_property=["yes", "no", ""]))
+    assert_allclose([*given, *_rule(name, _pairs())], [0.05, 0.07, 0.07, 0.07])
 
 
 @pytest.mark.parametrize(
@@ -181,13 +150,10 @@ def test_the_worked_example_of_the_turkish_rule():
     assert_allclose(_rule(name, pairs, 0.0, 0.0), 0.050)
 
 
-def test_the_indian_rule_with_and_without_its_amendment():
-    printed = "required_gap_is1893_event_based_unverified"
-    amended = "required_gap_is1893_amended_event_based"
-    assert_allclose(_rule(printed, _pairs()), 0.07)
-    assert_allclose(_rule(amended, _pairs()), 0.035)
-    for name in (printed, amended):
-        assert_allclose(_rule(name, _pairs(floor_offset=1.0)), 0.07)
+def test_the_indian_rule_with_its_amendment():
+    name = "required_gap_is1893_amended_event_based"
+    assert_allclose(_rule(name, _pairs()), 0.035)
+    assert_allclose(_rule(name, _pairs(floor_offset=1.0)), 0.07)
 
 
 @pytest.mark.parametrize(
@@ -236,36 +202,19 @@ def test_the_iranian_rule_adds_squares_of_displacements_within_one_property(same
     assert_allclose(_rule("required_gap_iran2800_event_based", pairs, 0.15, 0.2), expected)
 
 
-def test_the_algerian_rules_by_edition():
-    old, new = "required_gap_rpa99_event_based_unverified", "required_gap_rpa2024_event_based"
-    assert_allclose(_rule(old, _pairs()), 0.085)
-    assert_allclose(_rule(new, _pairs()), 0.05)
-    for name in (old, new):
-        assert_allclose(_rule(name, _pairs(), 0.0, 0.001), 0.04)
+def test_the_algerian_rule():
+    name = "required_gap_rpa2024_event_based"
+    assert_allclose(_rule(name, _pairs()), 0.05)
+    assert_allclose(_rule(name, _pairs(), 0.0, 0.001), 0.04)
 
 
-def test_the_chilean_rule_keeps_a_least_distance_on_each_side():
-    name = "required_gap_nch433_event_based_unverified"
-    # 0.002 of 24 m is 48 mm, more than 30 and 40 mm
-    assert_allclose(_rule(name, _pairs()), 0.096)
-    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.096)
-    low = _pairs(height_1=3.0, storeys_1=1.0)
-    assert_allclose(_rule(name, low, 0.0, 0.02), 0.035)
-
-
-def test_the_new_zealand_and_gem_rules():
-    assert_allclose(_rule("required_gap_nzs1170_event_based_unverified", _pairs()), 0.07)
+def test_the_gem_rule():
     assert_allclose(_rule("required_gap_gem", _pairs(height_2=12.0, storeys_2=4.0)), 0.48)
 
 
-@pytest.mark.parametrize("zone", list(NTC_SHARE))
-def test_mexican_rules_beside_the_one_of_2004(zone):
+@pytest.mark.parametrize("zone", list(NTC_SIMPLIFIED))
+def test_the_simplified_mexican_rule(zone):
     codes, other = Codes(ntc_zone=zone), _pairs(system_2="other")
-    of_2004 = _rule("required_gap_ntc2004_event_based", other, codes=codes)
-    # the current one is never halved
-    for pairs in (_pairs(), other):
-        current = _rule("required_gap_ntc2023_event_based_unverified", pairs, codes=codes)
-        assert_allclose(current, of_2004)
     simplified = 2 * 24 * NTC_SIMPLIFIED[zone]
     assert_allclose(_rule("required_gap_ntc2004_simplified", other, codes=codes), simplified)
     alike = _rule("required_gap_ntc2004_simplified", _pairs(), codes=codes)
@@ -277,7 +226,7 @@ def test_gaps_never_shrink_with_displacement_or_height():
     heights = np.array([3.0, 6.0, 9.0, 15.0, 24.0, 45.0])
     # never as high as the other: between equal buildings Mexico City's gap is halved
     size = {"height_1": heights, "height_2": 48.0, "storeys_1": heights / 3, "storeys_2": 16.0}
-    codes = Codes(ntc_zone="II", gb_intensity=7, italy_ground=0.3, fema_seismicity="high")
+    codes = Codes(ntc_zone="II", gb_intensity=7, italy_ground=0.3)
     gaps = {}
     for factor in (0.0, 1.0, 3.0):
         displacement = np.full(len(heights), 0.05 * factor)
@@ -291,80 +240,20 @@ def test_gaps_never_shrink_with_displacement_or_height():
     assert ((based > 0.25 * 0.15) & (based < 2.0)).all(axis=None)
 
 
-@pytest.mark.parametrize(
-    ("seismicity", "inches"),
-    [("very_high", 2.0), ("high", 1.5), ("moderately_high", 1.0), ("lower", 0.5)],
-)
-def test_fema_asks_for_inches_a_storey_of_the_shorter_building(seismicity, inches):
-    pairs = _pairs(storeys_2=12.0, height_2=36.0)
-    codes = Codes(fema_seismicity=seismicity)
-    assert_allclose(
-        _rule("required_gap_fema_p154_unverified", pairs, codes=codes), 8 * inches * INCH
-    )
-
-
-@pytest.mark.parametrize(
-    ("change", "flags"),
-    [
-        ({"gap": 0.5}, ""),
-        ({"gap": 0.1}, "separation"),
-        ({"gap": 0.5, "floor_offset": 0.62}, "floor_misalignment"),
-        ({"gap": 0.1, "floor_offset": 0.60}, "separation"),
-        ({"gap": 0.1, "floor_offset": -0.62}, "separation floor_misalignment pounding"),
-        (
-            {"gap": 0.1, "storeys_2": 10.0, "height_2": 30.0},
-            "separation height_difference pounding",
-        ),
-        ({"gap": 0.1, "storeys_2": 9.0, "height_2": 27.0}, "separation"),
-        ({"gap": 0.1, "position": "end"}, "separation end_of_row pounding"),
-        ({"gap": 0.5, "position": "end"}, "end_of_row"),
-    ],
-)
-def test_fema_flags(change, flags):
-    assert _rule("fema_p154_flags_unverified", _pairs(**change)) == [flags]
-
-
-@pytest.mark.parametrize(
-    ("gap", "aligned", "misaligned"),
-    [(0.0, 0.7, 0.4), (0.119, 0.7, 0.4), (0.2, 0.8, 0.7), (0.25, 1.0, 0.8)],
-)
-def test_nzsee_factors_by_floors(gap, aligned, misaligned):
-    assert _rule("nzsee_iep_factor_unverified", _pairs(gap=gap)) == [aligned]
-    assert _rule("nzsee_iep_factor_unverified", _pairs(gap=gap, floor_offset=1.0)) == [misaligned]
-
-
-@pytest.mark.parametrize(
-    ("storeys", "factors"),
-    # near, middle and far; the smaller of both factors
-    [(9, (0.7, 0.8, 1.0)), (10, (0.7, 0.8, 1.0)), (12, (0.7, 0.8, 1.0)), (13, (0.4, 0.7, 1.0))],
-)
-def test_nzsee_factors_by_the_difference_in_storeys(storeys, factors):
-    pairs = _pairs(
-        gap=[0.1, 0.2, 0.3], height_2=3.0 * storeys, storeys_2=float(storeys), floor_offset=0.0
-    )
-    assert _rule("nzsee_iep_factor_unverified", pairs) == list(factors)
-
-
 def test_a_rule_without_its_inputs_stays_empty_instead_of_guessing():
     # would catch unknown floors taken as aligned, and a region assumed
     silent = dict.fromkeys(("height_1", "height_2", "storeys_1", "storeys_2"), np.nan)
     pairs = _pairs(**silent, period_1=0.5, period_2=0.8, system_1="", system_2="")
     row = code_columns(pairs, [0.03], [0.04], Codes()).iloc[0]
-    known = row.drop("fema_p154_flags_unverified").dropna()
+    known = row.dropna()
     # unknown floors are not aligned, an unknown property is not one
     expected = {
         "asce7_event_based": 0.07,
-        "asce7_22_event_based_unverified": 0.07,
-        "ec8_event_based_unverified": 0.07,
-        "is1893_event_based_unverified": 0.07,
         "is1893_amended_event_based": 0.07,
-        "rpa99_event_based_unverified": 0.085,
         "rpa2024_event_based": 0.05,
-        "nzs1170_event_based_unverified": 0.07,
     }
     assert known.index.tolist() == [f"required_gap_{name}" for name in expected]
     assert_allclose(known.astype(float), list(expected.values()))
-    assert row["fema_p154_flags_unverified"] == ""
 
 
 def test_event_based_rules_keep_the_order_and_scale_of_the_buildings():
@@ -374,12 +263,7 @@ def test_event_based_rules_keep_the_order_and_scale_of_the_buildings():
     swapped = code_columns(pairs, [0.3, 0.1, 0.2], [0.1, 0.2, 0.3], REGION)
     pd.testing.assert_frame_equal(once, swapped)
     double = code_columns(pairs, [0.2, 0.4, 0.6], [0.6, 0.2, 0.4], REGION)
-    for name in (
-        "asce7_event_based",
-        "ec8_event_based_unverified",
-        "is1893_event_based_unverified",
-        "nzs1170_event_based_unverified",
-    ):
+    for name in ("asce7_event_based", "is1893_amended_event_based"):
         assert_allclose(double[f"required_gap_{name}"], 2 * once[f"required_gap_{name}"])
 
 

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import directional_correlation
-from per_obspy.screening.values import Table, both, components, number, values
+from per_obspy.screening.values import (
+    Both,
+    IndexArray,
+    Table,
+    components,
+    number,
+    oscillators,
+    values,
+)
 from per_obspy.spectra.azimuthal import (
     EVERY_AZIMUTH,
     azimuthal_per_spectrum,
@@ -43,20 +51,18 @@ class LogSpectra(NamedTuple):
     radii: FloatArray
 
 
-def log_oscillator(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+def log_oscillator(table: Table, i: int) -> Both:
     """Return ln period and ln damping of building i."""
     return log_period_and_damping(values(table, f"period_{i}"), values(table, f"damping_{i}"))
 
 
-def log_period_and_damping(
-    period: FloatArray, damping: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def log_period_and_damping(period: FloatArray, damping: FloatArray) -> Both:
     """Return ln period and ln damping, in s and fractions of critical."""
     return np.log(period), np.log(np.maximum(damping, SMALLEST_DAMPING))
 
 
 def stored_log(
-    spectra: LogSpectra, row: NDArray[np.intp], log_period: FloatArray, log_damping: FloatArray
+    spectra: LogSpectra, row: IndexArray, log_period: FloatArray, log_damping: FloatArray
 ) -> FloatArray:
     """
     Interpolate stored logarithms at (ln period, ln damping); constant beyond the grid.
@@ -90,7 +96,7 @@ def stored_log(
     return stored
 
 
-def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[IndexArray, FloatArray]:
     """Return the lower neighbour on a grid, and the fraction towards the next one, 0 to 1."""
     if grid.size == 1:
         return np.zeros(points.shape, dtype=np.intp), np.zeros(points.shape)
@@ -134,6 +140,11 @@ class StationMotion(NamedTuple):
     sd: LogSpectra
     per_rotd50: LogSpectra
 
+    @property
+    def components(self) -> tuple[FloatArray, FloatArray, float]:
+        """Accelerations to the north and east, m/s², and the sampling interval, s."""
+        return self.north, self.east, self.dt
+
 
 def station_motion(station: xr.Dataset) -> StationMotion:
     """
@@ -165,11 +176,11 @@ def station_motion(station: xr.Dataset) -> StationMotion:
     )
 
 
-def nearest_azimuth(station: StationMotion, table: Table) -> NDArray[np.intp]:
+def nearest_azimuth(station: StationMotion, table: Table) -> IndexArray:
     """Return the row of the stored azimuth nearest to ``azimuth_used`` of each pair."""
     count = station.azimuths.size
     azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
-    row: NDArray[np.intp] = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+    row: IndexArray = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
     return row
 
 
@@ -212,28 +223,16 @@ class PairMotion(NamedTuple):
     """
 
     azimuth: FloatArray
-    per: tuple[FloatArray, FloatArray]
-    sd: tuple[FloatArray, FloatArray]
+    per: Both
+    sd: Both
     correlation: FloatArray
 
 
 def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
-    """
-    Compute the motion along one azimuth per pair.
-
-    Parameters
-    ----------
-    station : StationMotion
-        The record.
-    pairs : Table
-        With periods and dampings of both buildings.
-    azimuth : (n_pairs,) ndarray
-        Degrees clockwise from north.
-    """
-    motion = station.north, station.east, station.dt
-    (period_1, damping_1), (period_2, damping_2) = _oscillators(pairs)
-    per_1, sd_1 = azimuth_maxima(*motion, period_1, damping_1, azimuth)
-    per_2, sd_2 = azimuth_maxima(*motion, period_2, damping_2, azimuth)
+    """Compute the motion along one azimuth per pair, (n_pairs,), degrees clockwise from north."""
+    period_1, damping_1, period_2, damping_2 = oscillators(pairs)
+    per_1, sd_1 = azimuth_maxima(*station.components, period_1, damping_1, azimuth)
+    per_2, sd_2 = azimuth_maxima(*station.components, period_2, damping_2, azimuth)
     # every pair has one azimuth: arrays (n_pairs, 1)
     return PairMotion(
         azimuth=azimuth[:, None],
@@ -251,9 +250,9 @@ def motion_of_one_horizontal(station: StationMotion, pairs: Table) -> PairMotion
 
 def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMotion:
     """Compute the motion along every degree of the half circle, for pairs of unknown azimuth."""
-    oscillators_1, oscillators_2 = _oscillators(pairs)
-    per_1, sd_1 = _every_radius(station, *oscillators_1)
-    per_2, sd_2 = _every_radius(station, *oscillators_2)
+    period_1, damping_1, period_2, damping_2 = oscillators(pairs)
+    per_1, sd_1 = _every_radius(station, period_1, damping_1)
+    per_2, sd_2 = _every_radius(station, period_2, damping_2)
     return PairMotion(
         azimuth=np.broadcast_to(EVERY_AZIMUTH, per_1.shape),
         per=(per_1, per_2),
@@ -262,29 +261,19 @@ def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMoti
     )
 
 
-def _oscillators(pairs: Table) -> list[tuple[FloatArray, FloatArray]]:
-    """Return period and damping of buildings 1 and of buildings 2."""
-    return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
-
-
 def _correlation(station: StationMotion, pairs: Table, azimuths: FloatArray) -> FloatArray:
     """Return the correlation of both responses along azimuths (n_pairs or 1, n_azimuths)."""
-    first, second = _oscillators(pairs)
-    motion = station.north, station.east, station.dt
-    return directional_correlation(*motion, *first, *second, azimuths)
+    return directional_correlation(*station.components, *oscillators(pairs), azimuths)
 
 
-def _every_radius(
-    station: StationMotion, periods: FloatArray, dampings: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _every_radius(station: StationMotion, periods: FloatArray, dampings: FloatArray) -> Both:
     """Return PER and SD along every azimuth, (n, 180); equal oscillators are computed once."""
-    motion = station.north, station.east, station.dt
     per, sd = np.empty((2, periods.size, EVERY_AZIMUTH.size))
     for damping in np.unique(dampings):
         damped = np.flatnonzero(dampings == damping)
         # one spectrum of the distinct periods serves all oscillators of this damping
         distinct, position = np.unique(periods[damped], return_inverse=True)
-        spectrum = distinct, damping, EVERY_AZIMUTH
-        per[damped] = azimuthal_per_spectrum(*motion, *spectrum)[position]
-        sd[damped] = azimuthal_sd_spectrum(*motion, *spectrum)[position]
+        spectrum = *station.components, distinct, damping, EVERY_AZIMUTH
+        per[damped] = azimuthal_per_spectrum(*spectrum)[position]
+        sd[damped] = azimuthal_sd_spectrum(*spectrum)[position]
     return per, sd

@@ -15,7 +15,6 @@ smaller of the elastic and the equivalent correlation is used.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation import ddc_correlation
@@ -29,7 +28,16 @@ from per_obspy.screening.by_record.station_motion import (
     nearest_azimuth,
     stored_log,
 )
-from per_obspy.screening.values import Columns, Table, both, chosen, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    Columns,
+    IndexArray,
+    Table,
+    both,
+    chosen,
+    values,
+)
 
 #: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
@@ -41,6 +49,10 @@ LARGEST_DAMPING = 0.99
 
 #: Properties that the equivalent linear building does not share with the given one.
 EQUIVALENT = ("period", "damping", "per")
+
+
+#: Buildings of one side, each (n_pairs, 1): row of the stored azimuth, period (s), damping.
+_Building = tuple[IndexArray, FloatArray, FloatArray]
 
 
 class Equivalent(NamedTuple):
@@ -61,24 +73,7 @@ class Equivalent(NamedTuple):
     period: FloatArray
     damping: FloatArray
     per: FloatArray
-    converged: NDArray[np.bool_]
-
-
-class _Building(NamedTuple):
-    """Buildings of one side: row of the stored azimuth, period (s), damping (of critical)."""
-
-    row: NDArray[np.intp]
-    period: FloatArray
-    damping: FloatArray
-
-
-class _Bracket(NamedTuple):
-    """Two ductilities (n_pairs, 1) around the last zero of the excess, and the excess there."""
-
-    low: FloatArray
-    high: FloatArray
-    excess_low: FloatArray
-    excess_high: FloatArray
+    converged: BoolArray
 
 
 def linearized_columns(station: StationMotion, table: Table) -> Columns:
@@ -116,7 +111,7 @@ def linearized_columns(station: StationMotion, table: Table) -> Columns:
     return columns
 
 
-def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
+def governing(table: Table, name: str) -> Both:
     """
     Return a property of the two oscillators that govern the estimated demand.
 
@@ -139,7 +134,7 @@ def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     return first, np.where(linearized, equivalent_2, elastic_2)
 
 
-def governing_radii(table: Table) -> tuple[FloatArray, FloatArray]:
+def governing_radii(table: Table) -> Both:
     """Return the PER of the oscillators of :func:`governing` at contact height, m."""
     radius_1, radius_2 = governing(table, "per")
     share_1, share_2 = both(table, "participation")
@@ -147,16 +142,15 @@ def governing_radii(table: Table) -> tuple[FloatArray, FloatArray]:
 
 
 def _elastic_columns(table: Table) -> Columns:
-    """Return the columns of pairs that stay elastic."""
+    """Return the columns of pairs that stay elastic: equivalent buildings are the elastic ones."""
     columns: Columns = {
         "critical_gap_linearized": values(table, "critical_gap_per").copy(),
         "correlation_linearized": values(table, "correlation").copy(),
     }
     for i in (1, 2):
         columns[f"ductility_{i}"] = _elastic_ductility(table, i)
-    # equivalent buildings are the elastic ones
-    for name in EQUIVALENT:
-        for i in (1, 2):
+        # period, damping and PER
+        for name in EQUIVALENT:
             columns[f"equivalent_{name}_{i}"] = values(table, f"{name}_{i}").copy()
     columns["linearized_converged"] = np.ones(len(columns["ductility_1"]), dtype=bool)
     return columns
@@ -171,43 +165,35 @@ def _yielding_columns(station: StationMotion, table: Table) -> Columns:
     """Return the columns of pairs in which a building yields."""
     row = nearest_azimuth(station, table)
     first, second = (_equivalent(station, row, table, i) for i in (1, 2))
-    correlation = _equivalent_correlation(station, table, first, second)
+    # eq. (16) of the equivalent buildings; in narrow motion at most the elastic one
+    correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
+    if record_bandwidth(*station.components) < NARROW:
+        correlation = np.minimum(correlation, values(table, "correlation"))
     # eq. (15) with the PER of the equivalent buildings at contact level
     share_1, share_2 = both(table, "participation")
-    radii = share_1 * first.per, share_2 * second.per
     columns: Columns = {
-        "critical_gap_linearized": critical_gap(*radii, correlation),
+        "critical_gap_linearized": critical_gap(
+            share_1 * first.per, share_2 * second.per, correlation
+        ),
         "correlation_linearized": correlation,
         "linearized_converged": first.converged & second.converged,
     }
     for i, building in enumerate((first, second), start=1):
         columns[f"ductility_{i}"] = building.ductility
-        columns[f"equivalent_period_{i}"] = building.period
-        columns[f"equivalent_damping_{i}"] = building.damping
-        columns[f"equivalent_per_{i}"] = building.per
+        for name in EQUIVALENT:
+            columns[f"equivalent_{name}_{i}"] = getattr(building, name)
     return columns
 
 
-def _equivalent_correlation(
-    station: StationMotion, table: Table, first: Equivalent, second: Equivalent
-) -> FloatArray:
-    """Return eq. (16) of the equivalent buildings; in narrow motion at most the elastic one."""
-    correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
-    if record_bandwidth(station.north, station.east, station.dt) < NARROW:
-        return np.minimum(correlation, values(table, "correlation"))
-    return correlation
-
-
-def _equivalent(station: StationMotion, row: NDArray[np.intp], table: Table, i: int) -> Equivalent:
+def _equivalent(station: StationMotion, row: IndexArray, table: Table, i: int) -> Equivalent:
     """Return the equivalent linear buildings i; elastic ones stay unchanged."""
     elastic = _elastic_ductility(table, i)
     period, damping = values(table, f"period_{i}"), values(table, f"damping_{i}")
     yields = elastic > 1.0
-    yielding = _Building(row[yields], period[yields], damping[yields])
-    # ductility on the stored SD
+    # rows of the stored azimuths, and oscillators that yield
+    yielding = row[yields, None], period[yields, None], damping[yields, None]
     ductility, converged = elastic.copy(), np.ones(elastic.size, dtype=bool)
-    found = _largest_ductility(station.sd, yielding, elastic[yields])
-    ductility[yields], converged[yields] = found
+    ductility[yields], converged[yields] = _largest_ductility(station.sd, yielding, elastic[yields])
     # longer period and added damping of Iwan (1980) at that ductility
     longer, added = iwan(np.maximum(ductility, 1.0), 0.0)
     damped = np.maximum(damping, np.minimum(damping + added, LARGEST_DAMPING))
@@ -219,20 +205,16 @@ def _equivalent(station: StationMotion, row: NDArray[np.intp], table: Table, i: 
 
 def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> FloatArray:
     """Return the equivalent over the elastic radius at ductilities (n_pairs, n)."""
-    row = building.row[:, None]
-    period, damping = building.period[:, None], building.damping[:, None]
-    # the oscillator at each ductility, and the elastic one
+    row, period, damping = building
     longer, added = iwan(ductility, 0.0)
     at_ductility = log_period_and_damping(period * longer, damping + added)
-    at_rest = log_period_and_damping(period, damping)
-    equivalent = stored_log(spectra, row, *at_ductility)
-    elastic = stored_log(spectra, row, *at_rest)
-    return np.asarray(np.exp(equivalent - elastic))
+    elastic = stored_log(spectra, row, *log_period_and_damping(period, damping))
+    return np.asarray(np.exp(stored_log(spectra, row, *at_ductility) - elastic))
 
 
 def _largest_ductility(
     sd: LogSpectra, building: _Building, elastic: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Return the largest ductility that the displacement reaches, and whether it was found."""
 
     def excess(ductility: FloatArray) -> FloatArray:
@@ -241,28 +223,30 @@ def _largest_ductility(
     # coarse scan, then a finer one of its last interval with a change of sign
     scanned = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
     over = excess(scanned)
-    coarse = _last_bracket(scanned, over)
-    finer = coarse.low + PARTS * (coarse.high - coarse.low)
-    fine = _last_bracket(finer, excess(finer))
+    low, high, *_ = _last_bracket(scanned, over)
+    finer = low + PARTS * (high - low)
+    low, high, excess_low, excess_high = _last_bracket(finer, excess(finer))
     # linear interpolation between the two ends
-    crosses = fine.excess_low > np.maximum(fine.excess_high, 0.0)
-    part = np.divide(
-        fine.excess_low,
-        fine.excess_low - fine.excess_high,
-        out=np.zeros_like(fine.excess_low),
-        where=crosses,
-    )
-    ductility = (fine.low + part * (fine.high - fine.low))[:, 0]
+    crosses = excess_low > np.maximum(excess_high, 0.0)
+    part = np.zeros_like(excess_low)
+    np.divide(excess_low, excess_low - excess_high, out=part, where=crosses)
+    ductility = (low + part * (high - low))[:, 0]
     converged = np.asarray(over[:, -1] <= 0.0)
     return np.where(converged, ductility, DUCTILITIES[-1]), converged
 
 
-def _last_bracket(ductility: FloatArray, excess: FloatArray) -> _Bracket:
-    """Return the bracket of the last zero of the excess, at the ends of the grid the nearest."""
+def _last_bracket(ductility: FloatArray, excess: FloatArray) -> tuple[FloatArray, ...]:
+    """
+    Return two ductilities (n_pairs, 1) around the last zero of the excess, and the excess there.
+
+    At the ends of the grid these are the nearest ones: an interval exists whatever the signs.
+    """
     positive = excess > 0.0
-    # an interval exists whatever the signs at both ends
     positive[:, 0], positive[:, -1] = True, False
     last = (excess.shape[1] - 1 - positive[:, ::-1].argmax(axis=1))[:, None]
-    low, high = np.take_along_axis(ductility, last, 1), np.take_along_axis(ductility, last + 1, 1)
-    excess_low = np.take_along_axis(excess, last, 1)
-    return _Bracket(low, high, excess_low, np.take_along_axis(excess, last + 1, 1))
+    # both ends of the interval
+    return tuple(
+        np.take_along_axis(column, last + step, 1)
+        for column in (ductility, excess)
+        for step in (0, 1)
+    )

@@ -25,11 +25,11 @@ of America 84 (4), 974-1002.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.screening.ground_motion.field import great_circle
+from per_obspy.screening.values import BoolArray, IndexArray, TextArray
 
 #: Magnitudes and Vs30 (m/s) for which the model was made; others count as the nearest of them.
 MAGNITUDES, VELOCITIES = (3.0, 8.5), (150.0, 1500.0)
@@ -240,7 +240,7 @@ class Peaks(NamedTuple):
     longitude: FloatArray
     latitude: FloatArray
     vs30: FloatArray
-    site_class: NDArray[np.object_]
+    site_class: TextArray
     pga: FloatArray
     pgv: FloatArray
 
@@ -263,7 +263,7 @@ class Deviations(NamedTuple):
 
     deviations: FloatArray
     expected: FloatArray
-    neighbours: NDArray[np.intp]
+    neighbours: IndexArray
     reach: FloatArray
 
 
@@ -278,7 +278,7 @@ class _Model(NamedTuple):
     between: float
     within: FloatArray
     # Where the model ends
-    is_beyond: NDArray[np.bool_]
+    is_beyond: BoolArray
 
     @property
     def deviation(self) -> FloatArray:
@@ -298,7 +298,7 @@ class _Neighbours(NamedTuple):
 
     difference: FloatArray
     scale: FloatArray
-    number: NDArray[np.intp]
+    number: IndexArray
     reach: FloatArray
 
     @property
@@ -402,7 +402,7 @@ def _neighbours(value: FloatArray, model: _Model, peaks: Peaks, has_source: bool
 
 
 def _scale(
-    model: _Model, station: int, near: NDArray[np.intp], distance: FloatArray, growth: float
+    model: _Model, station: int, near: IndexArray, distance: FloatArray, growth: float
 ) -> float:
     """Return the deviation of a difference from neighbours in their distances."""
     # Ground and path of the station and of the median, attenuation, extent of the rupture
@@ -412,9 +412,7 @@ def _scale(
     return float(np.hypot(np.hypot(own, away), extent))
 
 
-def _nearest(
-    station: int, usable: NDArray[np.bool_], peaks: Peaks
-) -> tuple[NDArray[np.intp], FloatArray]:
+def _nearest(station: int, usable: BoolArray, peaks: Peaks) -> tuple[IndexArray, FloatArray]:
     """Return the nearest others, on the station's ground where enough are, and their distances."""
     others = usable.copy()
     others[station] = False

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
-from per_obspy.screening.values import number, values
+from per_obspy.screening.values import BoolArray, IndexArray, TextArray, number, values
 
 
 class Sites(NamedTuple):
@@ -34,11 +34,11 @@ class Sites(NamedTuple):
 
     longitude: FloatArray
     latitude: FloatArray
-    site_class: NDArray[np.object_]
+    site_class: TextArray
     source_distance: FloatArray
     vs30: FloatArray
 
-    def at(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Sites":
+    def at(self, rows: IndexArray | BoolArray) -> "Sites":
         """Return some of the places."""
         return Sites(
             self.longitude[rows],
@@ -87,10 +87,10 @@ class Stations(NamedTuple):
         Function that returns the Dataset of a station, given its index.
     """
 
-    names: NDArray[np.object_]
+    names: TextArray
     longitude: FloatArray
     latitude: FloatArray
-    site_class: NDArray[np.object_]
+    site_class: TextArray
     read: Callable[[int], xr.Dataset]
 
 
@@ -214,10 +214,10 @@ def _place_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[
 def _serving_station(
     longitude: FloatArray,
     latitude: FloatArray,
-    site_class: NDArray[np.object_],
+    site_class: TextArray,
     stations: Stations,
     reach: float,
-) -> tuple[NDArray[np.intp], FloatArray]:
+) -> tuple[IndexArray, FloatArray]:
     """Return the index of the station that serves each place, and the distance to it."""
     index, distance = nearest_station(longitude, latitude, stations.longitude, stations.latitude)
     # A station of the same class goes before a nearer one if it is in reach
@@ -239,7 +239,7 @@ def nearest_station(
     latitude: FloatArray,
     station_longitude: FloatArray,
     station_latitude: FloatArray,
-) -> tuple[NDArray[np.intp], FloatArray]:
+) -> tuple[IndexArray, FloatArray]:
     """
     Find the nearest station of every place and the great-circle distance to it.
 

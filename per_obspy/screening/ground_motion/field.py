@@ -26,6 +26,7 @@ from per_obspy.config import Interpolation
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.kernels.kriging import kriged
 from per_obspy.screening.ground_motion.assignment import Sites, on_sphere
+from per_obspy.screening.values import BoolArray, Both, IndexArray
 
 #: The longest period for which the correlation was published, s; longer ones take its value.
 LONGEST = 10.0
@@ -193,7 +194,7 @@ def _averaged_by_place(
     return stations.at(first), total / np.bincount(place)[:, None], limits
 
 
-def _supported(limits: FloatArray, periods: FloatArray) -> NDArray[np.bool_]:
+def _supported(limits: FloatArray, periods: FloatArray) -> BoolArray:
     """Return (n_places, n_periods): whether a record holds within a grid step of the period."""
     lower = np.concatenate([periods[:1], periods[:-1]])
     upper = np.concatenate([periods[1:], periods[-1:]])
@@ -204,7 +205,7 @@ def _trends(
     distance: FloatArray,
     features: FloatArray,
     values: FloatArray,
-    supported: NDArray[np.bool_],
+    supported: BoolArray,
     periods: FloatArray,
     settings: Interpolation,
 ) -> Trend:
@@ -254,7 +255,7 @@ def _fitted(
     return coefficients, covariance, means, deviation
 
 
-def _prior(used: NDArray[np.intp], settings: Interpolation) -> tuple[FloatArray, FloatArray]:
+def _prior(used: IndexArray, settings: Interpolation) -> Both:
     """Return expected coefficients and their precision for a deviation of 1; 0 where unknown."""
     expected, precision = np.zeros((2, 1 + used.size))
     if DISTANCE in used:
@@ -267,7 +268,7 @@ def _posterior(
     design: FloatArray,
     correlation: FloatArray,
     values: FloatArray,
-    prior: tuple[FloatArray, FloatArray],
+    prior: Both,
     settings: Interpolation,
 ) -> tuple[FloatArray, FloatArray, float]:
     """Solve (X' C^-1 X + P) b = X' C^-1 y + P b0: b, its covariance, and Student's deviation."""
@@ -291,7 +292,7 @@ def _posterior(
     return coefficients, covariance, float(np.sqrt(variance * freedom / (freedom - 2.0)))
 
 
-def _slopes(features: FloatArray) -> NDArray[np.intp]:
+def _slopes(features: FloatArray) -> IndexArray:
     """Return a mask of the features with a slope: known distance, and others with enough spread."""
     # the prior makes up for stations that resolve no slope
     used: list[int] = []
@@ -345,7 +346,7 @@ class InterpolatedMotion(NamedTuple):
 
     ln_median: FloatArray
     log_std: FloatArray
-    fallback: NDArray[np.bool_]
+    fallback: BoolArray
 
 
 def fitted_field(
@@ -409,9 +410,7 @@ def fitted_field(
     return MotionField(grid, groups, settings.vs30_clustered)
 
 
-def _checked_grid(
-    stations: Sites, ln_per: ArrayLike, periods: ArrayLike
-) -> tuple[FloatArray, FloatArray]:
+def _checked_grid(stations: Sites, ln_per: ArrayLike, periods: ArrayLike) -> Both:
     """Return ln PER of every station and the grid of periods."""
     # Shapes first, then a grid that can be interpolated
     values = checks.finite("ln_per", ln_per)
@@ -465,7 +464,7 @@ def motion_at(field: MotionField, places: Sites, period: ArrayLike) -> Interpola
     return InterpolatedMotion(motion[:, 0].copy(), motion[:, 1].copy(), fallback)
 
 
-def _places_by_class(field: MotionField, places: Sites) -> Iterator[tuple[NDArray[np.intp], Group]]:
+def _places_by_class(field: MotionField, places: Sites) -> Iterator[tuple[IndexArray, Group]]:
     """Yield the places of each site class with the stations on it."""
     for name in np.unique(places.site_class.astype(str)).tolist():
         if name in field.groups:

@@ -28,7 +28,7 @@ from per_obspy.screening.ground_motion.field import (
     motion_at,
     on_grid,
 )
-from per_obspy.screening.values import number, values
+from per_obspy.screening.values import IndexArray, number, values
 
 #: Largest distance between epicentres of one earthquake, m: agencies differ by less.
 SAME_EARTHQUAKE = 50_000.0
@@ -217,9 +217,7 @@ def _places_of_pairs(pairs: pd.DataFrame) -> Sites:
     return sites(values(pairs, "longitude"), values(pairs, "latitude"), site_class, np.nan, vs30)
 
 
-def _stored_ln_per(
-    prepared: StationField, record: NDArray[np.intp], period: FloatArray
-) -> FloatArray:
+def _stored_ln_per(prepared: StationField, record: IndexArray, period: FloatArray) -> FloatArray:
     """Interpolate ln PER of the pairs' records at their periods."""
     lower, share = on_grid(prepared.field.periods, period)
     below = prepared.ln_per[record, lower]

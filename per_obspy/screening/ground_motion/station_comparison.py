@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from per_obspy.checks import FloatArray
@@ -27,7 +26,7 @@ from per_obspy.screening.ground_motion.amplitudes import (
 )
 from per_obspy.screening.ground_motion.assignment import site_class_of
 from per_obspy.screening.ground_motion.field import great_circle
-from per_obspy.screening.values import number
+from per_obspy.screening.values import BoolArray, number
 
 #: A place is wrong if it is farther from the middle of the stations than this, m, and than so many
 #: times their median distance, and another reading of its coordinates lies within this distance, m,
@@ -144,9 +143,7 @@ def _wrong_places(peaks: Peaks, earthquake: Earthquake) -> dict[int, Comparison]
     return said | _misread(peaks, np.isfinite(peaks.longitude) & ~is_empty, earthquake)
 
 
-def _misread(
-    peaks: Peaks, placed: NDArray[np.bool_], earthquake: Earthquake
-) -> dict[int, Comparison]:
+def _misread(peaks: Peaks, placed: BoolArray, earthquake: Earthquake) -> dict[int, Comparison]:
     """Return what is said of placed stations far away whose coordinates read otherwise are near."""
     # Stations have a middle, few of them have that of the earthquake
     east, north = peaks.longitude, peaks.latitude

@@ -4,12 +4,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.screening.values import BoolArray, Both, TextArray
 
 
 def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> FloatArray:
@@ -86,9 +87,7 @@ def _weighted_sum(probability: FloatArray, weight: FloatArray) -> FloatArray:
     return total
 
 
-def _scenarios(
-    probability: ArrayLike, weights: ArrayLike, name: str
-) -> tuple[FloatArray, FloatArray]:
+def _scenarios(probability: ArrayLike, weights: ArrayLike, name: str) -> Both:
     """Check probabilities, (n_scenarios, n_pairs), and one weight or rate per scenario."""
     pounding = np.atleast_2d(checks.between("probability", probability, 0.0, 1.0))
     weight = np.atleast_1d(checks.not_negative(name, weights))
@@ -193,7 +192,7 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     )
 
 
-def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.object_]:
+def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> TextArray:
     """Return the scenario of the hardest impact of each pair; the likeliest of equal ones."""
     probability = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
     velocity = rows[[f"expected_impact_velocity_{name}" for name in weights]].to_numpy(np.float64)
@@ -226,10 +225,10 @@ def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> I
         yield Rejection("pair", str(row["pair_id"]), "", None, tuple(reasons))
 
 
-def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.bool_]:
+def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> BoolArray:
     """Return a mask of pairs with a probability in every scenario and equal data in all."""
     names = [f"probability_{name}" for name in weights]
-    comparable: NDArray[np.bool_] = joined[names].notna().all(axis=1).to_numpy()
+    comparable: BoolArray = joined[names].notna().all(axis=1).to_numpy()
     for name in SAME:
         comparable = comparable & (joined[name] == joined[f"{name}_largest"]).to_numpy()
     return comparable

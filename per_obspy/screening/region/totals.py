@@ -14,9 +14,10 @@ from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.screening.values import TextArray
 
 
-def hexagons(longitude: ArrayLike, latitude: ArrayLike, resolution: int) -> NDArray[np.object_]:
+def hexagons(longitude: ArrayLike, latitude: ArrayLike, resolution: int) -> TextArray:
     """
     Find the H3 cell of each place.
 
@@ -190,7 +191,7 @@ class GridCells(NamedTuple):
         ``west, south, east, north`` in degrees, indexed by the cell.
     """
 
-    cell: NDArray[np.object_]
+    cell: TextArray
     boxes: pd.DataFrame
 
 

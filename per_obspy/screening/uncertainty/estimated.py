@@ -29,7 +29,7 @@ from per_obspy.screening.uncertainty.population import (
     Uncertain,
     population,
 )
-from per_obspy.screening.values import Columns, Table, chosen, values
+from per_obspy.screening.values import Columns, IndexArray, Table, chosen, values
 
 #: Median and log-standard deviation of the gap from SD and eq. (16) over the exact one: 91 pairs of
 #: periods from 0.3 to 4 s at 5 % damping under 14 broad-band records.
@@ -81,7 +81,7 @@ class UncertainMotion(NamedTuple):
     second: UncertainRadius
     correlation: FloatArray
     log_std: FloatArray
-    row: NDArray[np.intp]
+    row: IndexArray
 
     def rows(self, chosen_rows: NDArray[np.generic]) -> "UncertainMotion":
         """Return the motion of some pairs, by their numbers or a mask."""
@@ -155,7 +155,7 @@ def estimated_motion(
 
 
 def _oscillators(
-    building: UncertainRadius, row: NDArray[np.intp], spectra: LogSpectra, pairs: Table, i: int
+    building: UncertainRadius, row: IndexArray, spectra: LogSpectra, pairs: Table, i: int
 ) -> tuple[FloatArray, ...]:
     """Return the oscillators of building i in the rows of the kernel."""
     # the radius changes as the stored spectrum does from the medians to the node

@@ -25,7 +25,6 @@ histories.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
@@ -64,7 +63,17 @@ from per_obspy.screening.uncertainty.population import (
     period_at_nodes,
     population,
 )
-from per_obspy.screening.values import Columns, Table, both, chosen, only, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    Columns,
+    IndexArray,
+    Table,
+    both,
+    chosen,
+    only,
+    values,
+)
 
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
 YIELDING_NODES = 32
@@ -131,7 +140,7 @@ class _Block(NamedTuple):
     site: SiteDemand
     screening: Screening
 
-    def rows(self, numbers: NDArray[np.intp]) -> "_Block":
+    def rows(self, numbers: IndexArray) -> "_Block":
         """Return some of the pairs."""
         return self._replace(
             table=chosen(self.table, numbers),
@@ -182,13 +191,13 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     return result
 
 
-def _may_touch(station: StationMotion, table: Table, chance: FloatArray) -> NDArray[np.bool_]:
+def _may_touch(station: StationMotion, table: Table, chance: FloatArray) -> BoolArray:
     """Return where the record supports a pair that touches by a chance that is not negligible."""
     known = np.isfinite(values(table, "demand_exact")) & record_supports(station, table)
     return np.asarray(known & (chance >= NEGLIGIBLE))
 
 
-def _kinds(table: Table, chance: FloatArray) -> list[tuple[NDArray[np.bool_], int, int]]:
+def _kinds(table: Table, chance: FloatArray) -> list[tuple[BoolArray, int, int]]:
     """Return masks of pairs, each with the numbers of its first nodes and of all of them."""
     yields = can_yield(table)
     # drawn outlines that touch may still have a gap
@@ -205,13 +214,13 @@ def _kinds(table: Table, chance: FloatArray) -> list[tuple[NDArray[np.bool_], in
     ]
 
 
-def _blocks(mask: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+def _blocks(mask: BoolArray) -> list[IndexArray]:
     """Return the numbers of the rows of a mask in blocks of bounded memory."""
     rows, size = np.flatnonzero(mask), SAMPLES // len(NODES)
     return [rows[first : first + size] for first in range(0, rows.size, size)]
 
 
-def _fill(result: Columns, rows: NDArray[np.intp], part: Columns) -> None:
+def _fill(result: Columns, rows: IndexArray, part: Columns) -> None:
     """Put the columns of some rows in place."""
     for name, column in part.items():
         result[name][rows] = column
@@ -274,7 +283,7 @@ def _of_nodes(block: _Block, motion: RelativeMotion, nodes: FloatArray) -> Colum
     return outcome | {"probability": np.clip(outcome["probability"], lowest, highest)}
 
 
-def nodes_suffice(demands: FloatArray, gap: FloatArray) -> NDArray[np.bool_]:
+def nodes_suffice(demands: FloatArray, gap: FloatArray) -> BoolArray:
     """
     Return where all nodes lie on one side of the gap, with a margin (``BELOW``, ``ABOVE``).
 
@@ -289,7 +298,7 @@ def nodes_suffice(demands: FloatArray, gap: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(is_below | (demands.min(axis=1) > ABOVE * gap))
 
 
-def resolved_probability(demands: FloatArray, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
     """
     Return the smallest and the largest probability of contact that the nodes can show.
 
@@ -352,7 +361,7 @@ def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
     return _at_site(block, nodes, demand, velocity, ln_field)
 
 
-def _in_record(block: _Block, sample: Columns, count: int) -> tuple[FloatArray, FloatArray]:
+def _in_record(block: _Block, sample: Columns, count: int) -> Both:
     """Return demand and relative velocity in the record, of a number of nodes per pair."""
     yields = can_yield(sample)
     demand, velocity = _linear_approach(block.station, sample)
@@ -361,7 +370,7 @@ def _in_record(block: _Block, sample: Columns, count: int) -> tuple[FloatArray, 
     return demand.reshape(-1, count), velocity.reshape(-1, count)
 
 
-def _linear_approach(station: StationMotion, table: Table) -> tuple[FloatArray, FloatArray]:
+def _linear_approach(station: StationMotion, table: Table) -> Both:
     """Return demand and relative velocity in the record; NaN where a building can yield."""
     demand, velocity = np.full((2, len(table["gap"])), np.nan)
     linear = ~can_yield(table)

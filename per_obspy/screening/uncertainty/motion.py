@@ -16,12 +16,11 @@ is carried to the site as above.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation, Screening
-from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.screening.by_record.exact import can_yield
 from per_obspy.screening.by_record.station_motion import (
@@ -31,7 +30,16 @@ from per_obspy.screening.by_record.station_motion import (
     stored_log,
 )
 from per_obspy.screening.uncertainty.estimated import UncertainMotion, UncertainRadius
-from per_obspy.screening.values import Table, at_contact, both, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    IndexArray,
+    Table,
+    at_contact,
+    both,
+    pair_correlation,
+    values,
+)
 
 
 class SiteDemand(NamedTuple):
@@ -162,7 +170,7 @@ def estimate_log_std(table: Table, log_std: FloatArray, settings: Interpolation)
     return deviation
 
 
-def pair_at_site(table: Table) -> tuple[FloatArray, FloatArray]:
+def pair_at_site(table: Table) -> Both:
     """Return ln of the gap by PER at the site over that at the record, and its deviation."""
     ln_ratio_1, log_std_1 = motion_at_site(table, 1)
     ln_ratio_2, log_std_2 = motion_at_site(table, 2)
@@ -170,7 +178,7 @@ def pair_at_site(table: Table) -> tuple[FloatArray, FloatArray]:
     return pair_motion(at_contact(table, "per"), ratios, log_stds, both(table, "period"))
 
 
-def motion_at_site(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+def motion_at_site(table: Table, i: int) -> Both:
     """Return ln of radius i at the site over that of the record and its deviation; 0 if unknown."""
     if "ln_per_ratio_1" not in table:
         at_record = np.zeros_like(values(table, "gap"))
@@ -190,9 +198,7 @@ def ln_field_demand(station: StationMotion, table: Table, screening: Screening) 
     given = np.isfinite(values(table, "azimuth"))
     radius_1 = _radius_at_site(station, table, 1, row, given)
     radius_2 = _radius_at_site(station, table, 2, row, given)
-    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
-    correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
-    gap = critical_gap(radius_1, radius_2, correlation)
+    gap = critical_gap(radius_1, radius_2, pair_correlation(table))
     # the estimate is larger than the exact demand in the median
     with np.errstate(divide="ignore"):
         ln_demand: FloatArray = np.log(gap / screening.model_median)
@@ -203,8 +209,8 @@ def _radius_at_site(
     station: StationMotion,
     table: Table,
     i: int,
-    row: NDArray[np.intp],
-    given: NDArray[np.bool_],
+    row: IndexArray,
+    given: BoolArray,
 ) -> FloatArray:
     """Return the radius of building i at contact height at the site, from stored spectra, m."""
     oscillator = log_oscillator(table, i)
@@ -282,11 +288,11 @@ def _c2(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def pair_motion(
-    radii: tuple[FloatArray, FloatArray],
-    ln_ratios: tuple[FloatArray, FloatArray],
-    log_stds: tuple[FloatArray, FloatArray],
-    periods: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
+    radii: Both,
+    ln_ratios: Both,
+    log_stds: Both,
+    periods: Both,
+) -> Both:
     """
     Return ln of the needed gap at the site over that at the record, and its deviation.
 
@@ -325,7 +331,7 @@ def pair_motion(
     return ln_ratio, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _share(part: FloatArray, whole: FloatArray, moving: NDArray[np.bool_]) -> FloatArray:
+def _share(part: FloatArray, whole: FloatArray, moving: BoolArray) -> FloatArray:
     """Return part / whole of the squared gap, 0.5 for pairs without motion."""
     return np.divide(part, whole, out=np.full_like(whole, 0.5), where=moving)
 
@@ -367,7 +373,7 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     )
 
 
-def is_exact(table: Table) -> NDArray[np.bool_]:
+def is_exact(table: Table) -> BoolArray:
     """Return a mask of the pairs whose demand is the exact one."""
     return np.asarray(table["demand_rule"] == "exact")
 
@@ -386,7 +392,7 @@ def _radius(table: Table, i: int, screening: Screening) -> UncertainRadius:
     )
 
 
-def _linearized(table: Table) -> NDArray[np.bool_]:
+def _linearized(table: Table) -> BoolArray:
     """Return a mask of the pairs whose demand is that of equivalent linear buildings."""
     return np.asarray(table["demand_rule"] == "linearized")
 

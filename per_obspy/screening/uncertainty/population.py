@@ -27,7 +27,6 @@ real records; ``workflows/population_accuracy.py`` has their accuracy in others.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
@@ -39,7 +38,7 @@ from per_obspy.kernels.pairs.node_outcomes import (
     fill_velocities,
 )
 from per_obspy.pounding.probability import lognormal_dispersion
-from per_obspy.screening.values import Columns, Table, both, values
+from per_obspy.screening.values import BoolArray, Both, Columns, Table, both, values
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
 #: given buildings, and of ln gap: the second 128 Sobol points, which lie in the middle of their
@@ -94,7 +93,7 @@ def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray
     return np.asarray(np.minimum(damping, largest))
 
 
-def building_is_uncertain(pairs: Table) -> NDArray[np.bool_]:
+def building_is_uncertain(pairs: Table) -> BoolArray:
     """Return a mask of pairs in which a period or damping has a log-standard deviation."""
     period = np.maximum(*both(pairs, "period_log_std"))
     damping = np.maximum(*both(pairs, "damping_log_std"))
@@ -127,7 +126,7 @@ def one_wall_chance(pairs: Table) -> FloatArray:
     return np.where(touching, ONE_WALL, 0.0)
 
 
-def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:
+def _lognormal_gap(pairs: Table) -> Both:
     """Return median, m, and log-standard deviation of lognormal gaps."""
     gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
     assumed = values(pairs, "assumed_gap") > 0 if "assumed_gap" in pairs else gap < 0
@@ -141,7 +140,7 @@ def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:
     return median, dispersion
 
 
-def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> Both:
     """Return median, m, and log-standard deviation of lognormal gaps from measured ones."""
     # Quantiles of the normal distribution above 0
     apart = np.minimum(gap / (WIDE * deviation), 1.0)
@@ -289,7 +288,7 @@ def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) ->
     return chances
 
 
-def _received(pairs: Table) -> tuple[FloatArray, FloatArray]:
+def _received(pairs: Table) -> Both:
     """Return the change of velocity of both buildings over the impact velocity."""
     mass_1, mass_2 = both(pairs, "contact_mass")
     share = (1.0 + values(pairs, "restitution")) / (mass_1 + mass_2)

@@ -39,11 +39,10 @@ NUMBERS = (
     "missing_gap",
     "supplemental_damping",
     "bumper_restitution",
-    "nzsee_iep_factor_unverified",
 )
 
 #: Texts that depend on the gap.
-TEXTS = ("single_hit_status", "fema_p154_flags_unverified")
+TEXTS = ("single_hit_status",)
 
 
 def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:

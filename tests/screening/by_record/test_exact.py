@@ -12,11 +12,11 @@ from per_obspy.pounding.relative import yielding_relative_displacement
 from per_obspy.screening.by_record import exact
 from per_obspy.screening.by_record.exact import (
     EXACT_COLUMNS,
-    _pounding_maxima,
     exact_decides,
     exact_outcome,
     furthest_azimuth,
     no_outcome,
+    pounding_maxima,
 )
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.columns import RESULTS
@@ -92,10 +92,10 @@ class TestPairsThatStayApart:
         shares = (0.0, 0.5, 0.999, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.0 + 2e-6, 1.5, 9.0)
         table, azimuth = self._at_gaps(station, record, shares)
         outcome = exact_outcome(record, table, azimuth)
-        history = _pounding_maxima(record, table, azimuth)
+        history = pounding_maxima(record, table, azimuth)
         assert_array_equal(outcome["impacts"], history.impacts)
         assert_array_equal(outcome["impact_velocity_exact"], history.impact_velocity)
-        free = _pounding_maxima(record, dict(table) | {"gap": np.full(azimuth.size, 99.0)}, azimuth)
+        free = pounding_maxima(record, dict(table) | {"gap": np.full(azimuth.size, 99.0)}, azimuth)
         ratios = np.stack([outcome["amplification_exact_1"], outcome["amplification_exact_2"]])
         assert_allclose(ratios, history.per / free.per, rtol=1e-8)
         assert ratios.max() > 1.01
@@ -106,9 +106,9 @@ class TestPairsThatStayApart:
 
         def counted(station, table, azimuth):
             pairs.append(azimuth.size)
-            return _pounding_maxima(station, table, azimuth)
+            return pounding_maxima(station, table, azimuth)
 
-        monkeypatch.setattr(exact, "_pounding_maxima", counted)
+        monkeypatch.setattr(exact, "pounding_maxima", counted)
         exact_outcome(record, table, azimuth)
         assert pairs == [len(self.ROWS)]
 

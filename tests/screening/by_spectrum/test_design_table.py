@@ -170,5 +170,5 @@ def test_order_of_the_buildings_does_not_matter():
 def test_every_column_is_described():
     table = _table(_pairs(), Screening(codes=Codes(gb_intensity=7))).reset_index()
     described = {*RESULTS, *DESIGN, *rule_columns(), "pair_id", "gap"}
-    rules = {name for name in table if name.startswith(("required", "fema", "nzsee"))}
+    rules = {name for name in table if name.startswith("required")}
     assert {*LEADING, *rules} <= described

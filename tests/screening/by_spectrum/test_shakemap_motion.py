@@ -6,24 +6,27 @@ from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import make_pairs
 from shakemap_samples import PERIODS, make_map
 
-from per_obspy.config import Building
+from per_obspy.config import Building, Screening
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.by_record.station_motion import stored_log
-from per_obspy.screening.by_spectrum.demand import spectral_demand
+from per_obspy.screening.by_spectrum.demand import spectral_rows, spectral_uncertainty
 from per_obspy.screening.by_spectrum.shakemap import (
     DAMPINGS,
     MapMotion,
     at_period,
     damping_factor,
-    displacement_on_map,
+    map_motion,
     motion_on_map,
     seen_from,
-    uncertain_map_motion,
 )
 
 #: The middle southern node: PSA is 8, 4, 1 m/s2.
 NODE = np.array([20.0]), np.array([9.5])
 LN_SD = np.log(np.array([8.0, 4.0, 1.0]) * (PERIODS / 2 / np.pi) ** 2)
+
+
+#: An oscillator between two periods of the map.
+OSCILLATOR = {"period": 0.55, "damping": 0.05}
 
 
 def test_between_nodes_it_is_bilinear():
@@ -37,7 +40,8 @@ def test_between_periods_it_is_a_power():
     # SD of 8 m/s2 at 0.3 s and 4 at 1 s; would catch periods on a linear axis
     motion = motion_on_map(make_map(), *NODE, 0.6)
     power = np.log(4.0 / 8.0 / 0.3**2) / np.log(1 / 0.3)
-    found = displacement_on_map(motion, np.array([0.55]), np.array([0.05]))
+    pair = {f"{name}_{i}": np.array([one]) for name, one in OSCILLATOR.items() for i in (1, 2)}
+    found, _ = map_motion(motion, pair).sd
     expected = 8.0 * (0.3 / 2 / np.pi) ** 2 * (0.55 / 0.3) ** power
     assert_allclose(found, expected, rtol=1e-12)
 
@@ -71,15 +75,16 @@ def test_longitudes_are_counted_as_the_map_counts_them():
 
 @pytest.fixture(scope="module")
 def uncertain():
-    """Uncertain motion, spectra, pairs and demand: periods given, derived, and given again."""
+    """Motion by spectra, and its uncertainty: periods given, derived, and given again."""
     place = {"longitude_2": 20.0, "latitude_1": 9.5, "latitude_2": 9.5}
     derived = {**place, "period_1": np.nan, "height_1": 60.0, "storeys_1": 20.0}
     given = {**place, "period_1": 0.7, "damping_log_std_1": 0.2, "damping_1": 0.05}
     pairs = completed_pairs(make_pairs([given, derived, given]), Building())
     # all on the middle southern node
     motion = motion_on_map(make_map(log_std=0.5), np.full(3, 20.0), np.full(3, 9.5), 0.6)
-    demand = spectral_demand(pairs, (np.full(3, 0.1), np.full(3, 0.2)))
-    return *uncertain_map_motion(motion, pairs, demand), pairs, demand
+    by_map = map_motion(motion, pairs)
+    table = spectral_rows(pairs, by_map, Screening())
+    return by_map, spectral_uncertainty(table, by_map), table
 
 
 def test_every_pair_has_its_own_spectrum():
@@ -88,28 +93,27 @@ def test_every_pair_has_its_own_spectrum():
     pairs = completed_pairs(make_pairs([derived, given, derived]), Building())
     ln_sd = np.array([[-3.0, -2.0, -1.0], [0.0, 0.0, 0.0], [-1.0, -2.0, -4.0]])
     place = MapMotion(PERIODS, ln_sd, np.full((3, 3), 0.5))
-    demand = spectral_demand(pairs, (np.full(3, 0.1), np.full(3, 0.2)))
-    motion, spectra = uncertain_map_motion(place, pairs, demand)
+    motion = map_motion(place, pairs)
     # at 1 and 3 s, of the first and the third pair
     row, damping = motion.row[[0, 2]], np.full(2, np.log(0.05))
-    at_1_s = stored_log(spectra, row, np.zeros(2), damping)
-    at_3_s = stored_log(spectra, row, np.full(2, np.log(3.0)), damping)
+    at_1_s = stored_log(motion.spectra, row, np.zeros(2), damping)
+    at_3_s = stored_log(motion.spectra, row, np.full(2, np.log(3.0)), damping)
     assert_allclose(at_3_s - at_1_s, [1.0, -2.0], rtol=1e-12)
 
 
 def test_spectra_are_those_of_the_map(uncertain):
-    motion, spectra, _, _ = uncertain
-    assert spectra.radii.shape == (3, DAMPINGS.size, PERIODS.size)
+    motion, _, _ = uncertain
+    assert motion.spectra.radii.shape == (3, DAMPINGS.size, PERIODS.size)
     assert motion.row.tolist() == [0, 1, 2]
     # interpolated between dampings 26 % apart
     row, damping = np.zeros(3, dtype=int), np.full(3, np.log(0.05))
-    assert_allclose(stored_log(spectra, row, np.log(PERIODS), damping), LN_SD, atol=2e-3)
+    assert_allclose(stored_log(motion.spectra, row, np.log(PERIODS), damping), LN_SD, atol=2e-3)
 
 
 def test_map_and_estimate_are_uncertain(uncertain):
     # one motion with a deviation of 0.5 at both periods, whose residuals are correlated: the gap is
     # as uncertain as either radius, or less; the estimate adds 0.14
-    motion, _, _, demand = uncertain
-    assert_array_equal(motion.correlation, demand.correlation)
+    _, motion, table = uncertain
+    assert_array_equal(motion.correlation, table["correlation"])
     assert np.all(motion.log_std < np.hypot(0.5, 0.14))
     assert np.all(motion.log_std > np.hypot(0.3, 0.14))

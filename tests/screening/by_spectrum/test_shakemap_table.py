@@ -15,7 +15,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback, shakemap_rows
+from per_obspy.screening.by_spectrum.shakemap import shakemap_rows
 from per_obspy.screening.columns import FLAGS, ORDER
 
 
@@ -253,11 +253,11 @@ def test_pairs_outside_are_rejected_with_the_value():
 
 
 def test_pairs_without_a_station_fall_back_on_the_map():
-    # one has a station, one is on the map, one is out of reach of both: it has both reasons
+    # one is on the map, one is out of reach of both: it has both reasons
     pairs = _completed([{}, {}, {"latitude_1": 12.0, "latitude_2": 12.0}])
     reason = "nearest station XX.ONE is 99999 m away, beyond 20000 m"
     far = tuple(Rejection("pair", name, "", None, (reason,)) for name in ("P1", "P2"))
-    table, (rejection,) = shakemap_fallback(make_map(), pairs, far, Screening())
+    table, (rejection,) = shakemap_rows(make_map(), pairs.iloc[1:], Screening(), far)
     assert table["pair_id"].tolist() == ["P1"]
     assert rejection.name == "P2"
     assert rejection.reasons == (reason, "latitude = 12 is outside the ShakeMap's 9.5 to 10.5")

@@ -11,7 +11,7 @@ import per_obspy
 from per_obspy.config import Building, Codes, Screening
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.by_spectrum.design import DesignSpectrum, design_table
-from per_obspy.screening.by_spectrum.shakemap import shakemap_fallback
+from per_obspy.screening.by_spectrum.shakemap import shakemap_rows
 from per_obspy.screening.ground_motion.assignment import assigned, stations_of
 from per_obspy.screening.uncertainty.population import gap_dispersion, median_gap
 from per_obspy.screening.uncertainty.unknown_gaps import NUMBERS, TEXTS, UNKNOWN_CLASS, kept_apart
@@ -37,7 +37,7 @@ def station():
 
 def risk(station, gap, exact=True, building=None):
     """Return the risk table of all kinds of pairs with one gap, by pair."""
-    screening = Screening(exact=exact, codes=Codes(fema_seismicity="high"))
+    screening = Screening(exact=exact, codes=Codes(gb_intensity=8))
     pairs = make_pairs([{**kind, "gap": gap} for kind in KINDS])
     table = per_obspy.risk_table(station, pairs, building or Building(), screening)
     return table.set_index("pair_id").sort_index()
@@ -125,6 +125,6 @@ def test_a_shakemap_raises_the_flag(station):
     complete = kept_apart(completed_pairs(make_pairs([far]), Building()))
     stations, _ = stations_of([station])
     _, unreached = assigned(complete, stations, 1000.0)
-    rows, rejected = shakemap_fallback(make_map(), complete, unreached, Screening())
+    rows, rejected = shakemap_rows(make_map(), complete, Screening(), unreached)
     assert rejected == ()
     assert "unknown_gap" in rows["flags"].iloc[0].split()
