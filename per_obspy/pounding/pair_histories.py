@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.pounding.kernel_tables import (
@@ -196,6 +197,7 @@ def _run(
     rows[:, 0, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
     rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
     rows[:, 0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS
+    rows[:, 0, columns.COUNTED_SPEED] = SLOWEST_COUNTED
 
     # Run the record and, where it is asked for, the free vibration after it
     free_steps = free_vibration_steps(fields, dt) * free_vibration
