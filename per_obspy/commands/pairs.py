@@ -47,14 +47,15 @@ def asked_columns(path: "Path", form: "TableForm") -> "TableForm":
         Form of the table as far as it was recognised.
     """
     from per_obspy.inventory.files.formats import pair_file
-    from per_obspy.inventory.files.headings import is_building_list, missing_columns
+    from per_obspy.inventory.files.headings import is_building_list
+    from per_obspy.inventory.schema import missing_columns
 
     file = pair_file(path, form)
     columns = dict(form.columns)
     if is_building_list(file.headings):
         return form
     # What is missing, with the headings that may be meant first
-    for name in missing_columns(set(file.names)):
+    for name, *_ in missing_columns(file.names):
         proposed = file.meanings.proposals().get(name, [])
         heading = _choice(name, proposed, _unused(file, columns))
         if heading:

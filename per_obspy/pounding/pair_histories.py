@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.pounding.kernel_tables import closed_record, ground_motion, run_pairs
@@ -150,7 +151,9 @@ def pounding_histories(
         components = closed_record(components)
 
     # Rows of the kernels hold the squares of the largest radii
-    rows, impacts = run_pairs(run_block, LANE_ROWS, components, step, pairs, free_vibration)
+    rows, impacts = run_pairs(
+        run_block, LANE_ROWS, components, step, pairs, free_vibration, SLOWEST_COUNTED
+    )
     return PoundingMaxima(
         per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
         displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),

@@ -13,7 +13,6 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, R
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.kernels.pounding_rows.pieces import STATE_COLUMNS
-from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
 from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
@@ -469,6 +468,6 @@ def _lines_at_rest(rows: BuildingRows, scales: RowScales) -> FloatArray:
     # The last building of a row has no neighbour on its right: its gap is 1
     lines[:, columns.GAP] = scales.clearance * rows.gap
     lines[:, columns.RESTITUTION] = rows.restitution
-    lines[:, COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
+    lines[:, columns.COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
     return lines

@@ -1,5 +1,6 @@
 """Bilinear oscillators: histories, and inelastic PER spectra of given strength."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,9 +8,16 @@ import numpy as np
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.kernels.oscillator import bilinear as kernels
+from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
+from per_obspy.kernels.pounding_events.row_history import WORK_HYSTERETIC, run_history
 from per_obspy.spectra.elastic import row_of
 from per_obspy.spectra.trace_arguments import takes_trace
+
+#: Free vibration after the record is followed until no result changes, for so many periods at most.
+PERIODS_AFTER_RECORD = 200
+#: Half the changes of stiffness in a step above which a history is given up.
+MOST_EVENTS = 1000
 
 
 class BilinearResponse(NamedTuple):
@@ -220,26 +228,30 @@ def _response(
     record: FloatArray, dt: float, omega: float, damping: float, limit: float, hardening: float
 ) -> BilinearResponse:
     """Return the response of one oscillator with a yield displacement ``limit``, m."""
-    # The kernel takes acceleration / omega² with a ramp to zero and gives lengths in m; largest
-    # are displacement, squared radius, squared radius of the energy, and path of yielding
-    static = np.append(record, 0.0) / omega**2
-    history, state, largest = np.empty((3, record.size)), np.zeros(4), np.zeros(4)
-    kernels.bilinear_history(static, omega * dt, damping, limit, hardening, history, state, largest)
-    farthest, square, energy, path = largest
+    # A row of one structure of unit mass, in steps that are short enough for the kernel
+    row = np.zeros((1, columns.ROW_COLUMNS))
+    row[0, :6] = damping * omega, omega**2, hardening, limit, 1.0, 1.0
+    row[0, columns.BOUNCE_LIMIT] = MOST_EVENTS
+    refinement = max(1, math.ceil(omega * dt / columns.LARGEST_ANGLE))
 
-    # Yielding dissipates the yield force along its path; an infinite yield displacement is never
-    # reached, so that its path is zero
-    work = (1.0 - hardening) * omega**2 * limit * path if path > 0.0 else 0.0
+    # The ground returns to rest by a ramp of one interval
+    closed, log = np.append(record, 0.0), np.empty((0, LOG_COLUMNS))
+    samples = closed.size + math.ceil(PERIODS_AFTER_RECORD * 2.0 * np.pi / (omega * dt))
+    motion, work = np.zeros((samples, 1, 3)), np.zeros((samples, 1, 4))
+    used = run_history(closed, dt, refinement, row, log, motion, work)
+    if used < 0:
+        raise RuntimeError(f"no end of yielding and unloading at {-used * dt:g} s")
+    history, (structure,) = motion[: record.size, 0], row
     return BilinearResponse(
-        displacement=history[0],
-        velocity=history[1] * omega,
-        plastic_displacement=history[2],
-        ductility=float(farthest / limit),
-        hysteretic_energy=float(work),
-        displacement_maximum=float(farthest),
-        residual=float((1.0 - hardening) * state[2]),
-        displacement_radius=float(np.sqrt(square)),
-        energy_radius=float(np.sqrt(energy)),
+        displacement=history[:, 0],
+        velocity=history[:, 1],
+        plastic_displacement=history[:, 2],
+        ductility=float(structure[columns.LARGEST_DISPLACEMENT] / limit),
+        hysteretic_energy=float(work[used - 1, 0, WORK_HYSTERETIC]),
+        displacement_maximum=float(structure[columns.LARGEST_DISPLACEMENT]),
+        residual=float((1.0 - hardening) * structure[columns.PLASTIC]),
+        displacement_radius=float(np.sqrt(structure[columns.LARGEST_RADIUS_SQUARED])),
+        energy_radius=float(np.sqrt(structure[columns.LARGEST_ENERGY_RADIUS_SQUARED])),
     )
 
 

@@ -72,6 +72,9 @@ ELASTIC_RESPONSES, YIELDED_RESPONSES = 75, 81
 
 #: interface: largest opening so far, beyond its gap (m)
 OPENING = 87
+#: smallest approach speed that counts as an impact (m/s in the unit of the interface); only the
+#: lanes use it, which do not follow openings
+COUNTED_SPEED = OPENING
 #: Taylor coefficients of the displacement over the share of a step, from rest, with an acceleration
 #: that starts at 0 and grows by 1 per step (lanes only)
 RAMP_RESPONSE = 88

@@ -1,27 +1,29 @@
 r"""
-Whether the rest of a record can still change a result of a pair, by bounds of its energy.
+Whether the rest of a record can still change a result of a row, by bounds of its energy.
 
-A structure has the norm ``w² = v² + 2 e u v + omega² u²``, with its displacement u from where it
+A building has the norm ``w² = v² + 2 e u v + omega² u²``, with its displacement u from where it
 rests. With ``e = xi omega`` the root w falls like ``exp(-e t)`` in free vibration, and rises by the
 integral of the size of its force per unit mass at most.
 
-Two linear structures that touch at rest have the norm ``w² = m1 w1² + m2 w2²`` with one e for both,
-the smaller ``xi omega``. A contact force F, an impulse too, changes the product ``e m u v`` of both
-by ``e F (u2 - u1) = 0``, and never adds kinetic energy. So w falls and rises alike, whatever
-impacts there are; the rate of the structure of larger ``xi omega`` leaves ``2 e`` by ``e² (xi omega
-- e) / (omega² - e²)`` of w² at most.
+Linear buildings without a gap between them are a *group*, with the norm ``W² = sum m w²`` and one e
+for all, the smallest ``xi omega``. A contact force F between neighbours, an impulse too, changes
+the product ``e sum m u v`` by ``e F (u_right - u_left) = 0``, and never adds kinetic energy. So W
+rises by the integral of the size of the ground acceleration times the root of ``sum m q²`` at most,
+with participations q, and falls like ``exp(-e t)``; the rate of a building of larger ``xi omega``
+leaves ``2 e`` by ``e² (xi omega - e) / (omega² - e²)`` of W² at most.
 
-A pair with a gap is followed as two structures that do not touch. That holds as long as the sum of
-both displacements stays below the gap. Two equal linear structures with the same state move as one
-without any contact force: each is followed alone, and there is no impact.
+Groups are followed as if they did not touch each other. That holds as long as the displacements on
+both sides of a gap together stay below it. Equal linear buildings that have the same state move as
+one without any contact force: they are followed as one, and there is no impact between them.
 """
 
 import math
 
 from per_obspy.kernels._jit import lean
-from per_obspy.kernels.pounding_events.contact import COUNTED_SHARE, SLOWEST_COUNTED
+from per_obspy.kernels.pounding_events.contact import COUNTED_SHARE
 from per_obspy.kernels.pounding_events.motion import (
     APPROACH,
+    COUNTED_SPEED,
     DAMPING_RATE,
     GAP,
     HARDENING,
@@ -31,6 +33,7 @@ from per_obspy.kernels.pounding_events.motion import (
     PHASE,
     PLASTIC,
     STIFFNESS,
+    TAYLOR,
     YIELD,
     U,
     V,
@@ -40,19 +43,26 @@ from per_obspy.kernels.pounding_events.motion import (
 GROUP_SAMPLES = 64
 #: Part of a limit, so that rounding does not matter.
 CERTAIN = 1.0 - 1e-9
+# bounds, in columns that are free between events; in the line of the first building of a group:
+#: norm now, norm above which a result may change, decay of the norm over a group of samples, its
+#: rise by the integral of the ground acceleration, and clearance at rest on the left of the group
+NORM, LIMIT, DECAY, GAIN, CLEARANCE = range(TAYLOR, TAYLOR + 5)
+#: largest displacement of each building over the norm of its group
+REACH = TAYLOR + 5
 
 
 @lean
 def remains_still(row, cosine, sine, sizes, duration, group):
     """
-    Return whether the motion from a group on can change no maximum, count or impact velocity.
+    Return whether the motion from a group of samples on can change no result of a row.
 
     Parameters
     ----------
-    row : (2, ROW_COLUMNS) ndarray
-        Row of structures of the pair at the start of the group; see `motion` for its columns.
+    row : (n_buildings, ROW_COLUMNS) ndarray
+        Row at the start of the group; see `motion` for its columns. Its Taylor polynomials are
+        overwritten.
     cosine, sine : float
-        Of the azimuth of the axis from structure 1 to 2.
+        Of the azimuth of the axis of the row.
     sizes : (2, n_groups) ndarray
         Integrals of the size of the north and east acceleration over the groups, m/s. The ground
         rests after them.
@@ -66,132 +76,119 @@ def remains_still(row, cosine, sine, sizes, duration, group):
     bool
         True is certain.
     """
-    direction = abs(cosine), abs(sine)
-    # linear pairs that never hit each other, or do from the start
-    if row[0, YIELD] == math.inf and row[1, YIELD] == math.inf:
-        if _moves_as_one(row):
-            return _free_pair_remains_still(row, direction, sizes, duration, group, math.inf)
-        if row[0, GAP] == 0.0:
-            return _touching_pair_remains_still(row, direction, sizes, duration, group)
-    return _free_pair_remains_still(row, direction, sizes, duration, group, row[0, GAP])
-
-
-@lean
-def _moves_as_one(row):
-    """Return whether both linear structures have the same equation and the same state."""
-    return (
-        (row[0, STIFFNESS] == row[1, STIFFNESS])
-        & (row[0, DAMPING_RATE] == row[1, DAMPING_RATE])
-        & (row[0, PARTICIPATION] == row[1, PARTICIPATION])
-        & (row[0, U] == row[1, U])
-        & (row[0, V] == row[1, V])
-    )
-
-
-@lean
-def norm_of(row, i, centre, rate):
-    """Return the root of the norm of structure i about a centre, over the root of its mass, m/s."""
-    u = row[i, U] - centre
-    v = row[i, V]
-    return math.sqrt(max(v * v + 2.0 * rate * u * v + row[i, STIFFNESS] * u * u, 0.0))
-
-
-@lean
-def _stay_below(norms, decays, gains, limits, direction, sizes, group):
-    """Return whether two norms stay below their limits, and their weighted sum below 1."""
-    first, second = norms
+    before = first = 0
+    while first < row.shape[0]:
+        last = _last_of_group(row, first)
+        if not _write_bounds(row, first, last, duration):
+            return False
+        # two buildings that move as one keep their gap
+        row[first, CLEARANCE] = math.inf
+        if first > 0 and not (before == last - 1 and _moves_as_one(row, before, last)):
+            shift = _centre(row, first) - _centre(row, first - 1)
+            row[first, CLEARANCE] = CERTAIN * (row[first - 1, GAP] + shift)
+        before = first
+        first = last + 1
+    # group of samples after group of samples, and once more after the record
     for k in range(group, sizes.shape[1] + 1):
-        # the rise over this group; none after the record
         size = 0.0
         if k < sizes.shape[1]:
-            size = direction[0] * sizes[0, k] + direction[1] * sizes[1, k]
-        rise = gains[0] * size
-        other_rise = gains[1] * size
-        # highest inside the group
-        high = first + rise
-        other_high = second + other_rise
-        if high > limits[0] or other_high > limits[1]:
+            size = abs(cosine) * sizes[0, k] + abs(sine) * sizes[1, k]
+        if not _stays_below(row, size):
             return False
-        if high * limits[2] + other_high * limits[3] > 1.0:
-            return False
-        first = decays[0] * first + rise
-        second = decays[1] * second + other_rise
     return True
 
 
 @lean
-def _touching_pair_remains_still(row, direction, sizes, duration, group):
-    """Return whether a linear pair without gap changes no result any more."""
-    # norm, force over acceleration, and limits of both structures
-    rate = min(row[0, DAMPING_RATE], row[1, DAMPING_RATE])
-    total = force = slowness = excess = 0.0
+def _last_of_group(row, first):
+    """Return the last building of the group that begins with the first."""
+    last = first
+    while last < row.shape[0] - 1 and row[last, GAP] == 0.0:
+        if row[last, YIELD] < math.inf or row[last + 1, YIELD] < math.inf:
+            break
+        last += 1
+    return last
+
+
+@lean
+def _centre(row, i):
+    """Return the displacement at which a building rests in its elastic phase."""
+    return (1.0 - row[i, HARDENING]) * row[i, PLASTIC] if row[i, YIELD] < math.inf else 0.0
+
+
+@lean
+def _moves_as_one(row, first, last):
+    """Return whether linear buildings have the same equation and the same state."""
+    is_one = True
+    for i in range(first + 1, last + 1):
+        is_one &= (row[first, YIELD] == math.inf) & (row[i, YIELD] == math.inf)
+        for column in (STIFFNESS, DAMPING_RATE, PARTICIPATION, U, V):
+            is_one &= row[i, column] == row[first, column]
+    return is_one
+
+
+@lean
+def _write_bounds(row, first, last, duration):
+    """Write the bounds of a group; return whether it has any, and is below its limit."""
+    rate = math.inf
+    for i in range(first, last + 1):
+        rate = min(rate, row[i, DAMPING_RATE])
+    is_one = _moves_as_one(row, first, last)
+    # norm, force over acceleration, and limits; what moves as one is bounded without its mass
+    square = force = excess = 0.0
     limit = math.inf
-    for i in range(2):
-        mass = row[i, MASS]
+    for i in range(first, last + 1):
+        stiffness = row[i, STIFFNESS]
+        mass = 1.0 if is_one else row[i, MASS]
         # share of the velocity that the product e u v may hide
-        hidden = rate * rate / row[i, STIFFNESS]
-        if mass == math.inf or hidden > 0.5:
+        hidden = rate * rate / stiffness
+        if row[i, PHASE] != 0.0 or mass == math.inf or (hidden > 0.5 and not is_one):
             return False
-        norm = norm_of(row, i, 0.0, rate)
-        total += mass * norm * norm
-        force += mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
-        slowness += 1.0 / (mass * (1.0 - hidden))
+        centre = _centre(row, i)
+        u = row[i, U] - centre
+        v = row[i, V]
+        own = mass * max(v * v + 2.0 * rate * u * v + stiffness * u * u, 0.0)
+        drive = mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
+        square = own if is_one else square + own
+        force = drive if is_one else force + drive
         excess = max(excess, (row[i, DAMPING_RATE] - rate) * hidden / (1.0 - hidden))
-        # largest displacement, and with it the largest radius
-        reach = row[i, LARGEST_DISPLACEMENT] * math.sqrt(row[i, STIFFNESS])
-        limit = min(limit, reach * math.sqrt(mass * (1.0 - math.sqrt(hidden))))
-    # impacts: none that counts, and none faster
-    fastest = row[0, APPROACH]
-    speed = min(fastest, max(SLOWEST_COUNTED, COUNTED_SHARE * fastest))
-    limit = CERTAIN * min(limit, speed / math.sqrt(slowness))
-    if not math.sqrt(total) < limit or excess > 2.0 * rate:
-        return False
-    decay = math.exp(-(rate - 0.5 * excess) * duration)
-    norms, gains = (math.sqrt(total), 0.0), (math.sqrt(force), 0.0)
-    return _stay_below(norms, (decay, 1.0), gains, (limit, 1.0, 0.0, 0.0), direction, sizes, group)
+        # largest displacement, and with it the largest radius; it yields no more
+        room = row[i, LARGEST_DISPLACEMENT] - abs(centre)
+        room = min(room, row[i, YIELD] - abs(row[i, PLASTIC] - centre))
+        limit = min(limit, room * math.sqrt(stiffness * mass * (1.0 - math.sqrt(hidden))))
+        row[i, REACH] = 1.0 / math.sqrt(mass * (stiffness - rate * rate))
+        # impacts: none that counts, and none that is the fastest of its interface
+        if i < last and not is_one:
+            slowness = 0.0
+            for k in range(i, i + 2):
+                slowness += 1.0 / (row[k, MASS] * (1.0 - rate * rate / row[k, STIFFNESS]))
+            fastest = row[i, APPROACH]
+            speed = min(fastest, max(row[i, COUNTED_SPEED], COUNTED_SHARE * fastest))
+            limit = min(limit, speed / math.sqrt(slowness))
+    # all of the group, in its first line
+    row[first, NORM] = math.sqrt(square)
+    row[first, LIMIT] = CERTAIN * limit
+    row[first, DECAY] = math.exp(-(rate - 0.5 * excess) * duration)
+    row[first, GAIN] = math.sqrt(force)
+    return row[first, NORM] < row[first, LIMIT] and excess <= 2.0 * rate
 
 
 @lean
-def _free_limits(row, i):
-    """Return centre of structure i, and the largest norm at which it changes no result, m/s."""
-    centre = 0.0
-    room = math.inf
-    if row[i, YIELD] < math.inf:
-        # it yields no more
-        centre = (1.0 - row[i, HARDENING]) * row[i, PLASTIC]
-        room = row[i, YIELD] - abs(row[i, PLASTIC] - centre)
-    room = CERTAIN * min(room, row[i, LARGEST_DISPLACEMENT] - abs(centre))
-    # radius, by its norm
-    omega = math.sqrt(row[i, STIFFNESS])
-    hidden = row[i, DAMPING_RATE] / omega
-    return centre, room * omega * math.sqrt(max(1.0 - hidden, 0.0))
+def _stays_below(row, size):
+    """
+    Return whether all groups stay below their limits, and apart, over a group of samples.
 
-
-@lean
-def _free_pair_remains_still(row, direction, sizes, duration, group, gap):
-    """Return whether a pair never closes a gap or yields again, nor exceeds its maxima."""
-    if row[0, PHASE] != 0.0 or row[1, PHASE] != 0.0:
-        return False
-    left, limit = _free_limits(row, 0)
-    right, other_limit = _free_limits(row, 1)
-    norm = norm_of(row, 0, left, row[0, DAMPING_RATE])
-    other_norm = norm_of(row, 1, right, row[1, DAMPING_RATE])
-    # clearance at rest
-    room = CERTAIN * (gap - left + right)
-    if not (norm < limit and other_norm < other_limit and room > 0.0):
-        return False
-    # displacement over the clearance, by the norm
-    shares = _reach_by_norm(row, 0) / room, _reach_by_norm(row, 1) / room
-    decays = (
-        math.exp(-row[0, DAMPING_RATE] * duration),
-        math.exp(-row[1, DAMPING_RATE] * duration),
-    )
-    gains = abs(row[0, PARTICIPATION]), abs(row[1, PARTICIPATION])
-    limits = limit, other_limit, shares[0], shares[1]
-    return _stay_below((norm, other_norm), decays, gains, limits, direction, sizes, group)
-
-
-@lean
-def _reach_by_norm(row, i):
-    """Return the largest displacement of structure i from its centre over its norm, s."""
-    return 1.0 / math.sqrt(row[i, STIFFNESS] - row[i, DAMPING_RATE] * row[i, DAMPING_RATE])
+    ``size`` is the integral of the size of the ground acceleration; the norms are moved on.
+    """
+    before = 0.0
+    first = 0
+    while first < row.shape[0]:
+        # highest inside the group of samples, and the gap to the group before
+        rise = row[first, GAIN] * size
+        high = row[first, NORM] + rise
+        if high > row[first, LIMIT] or before + high * row[first, REACH] >= row[first, CLEARANCE]:
+            return False
+        last = _last_of_group(row, first)
+        before = high * row[last, REACH]
+        row[first, NORM] = row[first, DECAY] * row[first, NORM] + rise
+        first = last + 1
+    return True

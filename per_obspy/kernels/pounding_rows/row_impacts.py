@@ -22,6 +22,7 @@ from per_obspy.kernels.pounding_events.motion import (
     BOUNCE_LIMIT,
     BOUNCES,
     CLEARANCE_ORDER,
+    COUNTED_SPEED,
     EVENT_FUNCTION,
     GAP,
     GAP_ROUNDING,
@@ -51,7 +52,6 @@ from per_obspy.kernels.pounding_rows.pieces import (
     raise_maximum,
     set_state,
 )
-from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 from per_obspy.kernels.pounding_rows.window_lanes import (
     BEFORE,
     CLEARANCE,

@@ -25,12 +25,10 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 from per_obspy.kernels.pounding_lanes.pair_rows import fill_ramp_response, rest_pair
-from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES
+from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES, remains_still
 from per_obspy.kernels.pounding_lanes.run_block import GROUPS_BETWEEN_CHECKS, SETTLING_STEPS
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
-from per_obspy.kernels.pounding_rows.last_impacts import is_over
 from per_obspy.kernels.pounding_rows.member_phases import load_row, write_constants
-from per_obspy.kernels.pounding_rows.remaining_row_motion import row_remains_still
 from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 
 
@@ -132,7 +130,10 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
             load_row(members[first:end], lines[first:end])
             row = lines[first:end]
             # at rest from now on
-            if elapsed >= free_steps[number] or is_settled(row) or is_over(row):
+            is_over = is_settled(row)
+            if not is_over:
+                is_over = remains_still(row, 1.0, 0.0, record.sizes, 0.0, record.sizes.shape[1])
+            if elapsed >= free_steps[number] or is_over:
                 free_steps[number] = -1
                 _rest_row(lanes, members, first, end)
             else:
@@ -155,7 +156,7 @@ def _retire_still_rows(lanes, memory, firsts, cosine, sine, record, grounds, fre
 
     Return the number of the others.
     """
-    members, lines, _, states, deferred, _ = memory
+    members, lines, _, _, deferred, _ = memory
     duration = GROUP_SAMPLES * record.refinement * record.duration
     active = 0
     for number in range(firsts.size - 1):
@@ -167,14 +168,8 @@ def _retire_still_rows(lanes, memory, firsts, cosine, sine, record, grounds, fre
                 read_lane(lanes, lane, members[lane])
             load_row(members[first:end], lines[first:end])
             # maxima of deferred tiles are larger still: a row that is over is over with them
-            if row_remains_still(
-                lines[first:end],
-                states[first:end],
-                cosine[number],
-                sine[number],
-                record.sizes,
-                duration,
-                group,
+            if remains_still(
+                lines[first:end], cosine[number], sine[number], record.sizes, duration, group
             ):
                 for lane in range(first, end):
                     own = members[lane], lines[lane : lane + 1], deferred[lane : lane + 1]

@@ -75,6 +75,7 @@ def _row(displacement, largest=0.1, fastest=1.0, gap=0.0):
     row[:, columns.PARTICIPATION] = row[:, columns.MASS] = 1.0
     row[:, columns.U], row[:, columns.LARGEST_DISPLACEMENT] = displacement, largest
     row[0, columns.APPROACH], row[0, columns.GAP] = fastest, gap
+    row[0, columns.COUNTED_SPEED] = 1e-3
     return row
 
 
