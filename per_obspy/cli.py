@@ -26,7 +26,6 @@ from per_obspy.commands.screen import screen
 from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
-from per_obspy.full_vectors import use_full_vectors
 from per_obspy.jobs.worker_start import forked_workers
 from per_obspy.machine import machine_fault
 from per_obspy.termination import (
@@ -39,9 +38,6 @@ from per_obspy.termination import (
 
 #: Words for the ends by a signal.
 SIGNALLED = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
-
-#: Commands that compute for long.
-_LONG = {"run", "process", "spectra", "screen", "warm-up"}
 
 #: Errors of writing, rather than of opening files or starting processes.
 _ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -121,17 +117,10 @@ def _failed_output(error: OSError) -> int:
     return _failed(WriteError("standard output", reason), TRY_LATER)
 
 
-def _compute() -> None:
-    """Run a command, with the widest vectors that pay if it computes for long."""
-    if _LONG.intersection(sys.argv[1:2]):
-        use_full_vectors()
-    app()
-
-
 def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
-        _compute()
+        app()
     except KeyboardInterrupt:
         return INTERRUPTED
     except TryLater as error:

@@ -12,12 +12,7 @@ import numba
 from filelock import FileLock
 from numba.core.caching import FunctionCache
 
-from per_obspy.kernels._linking import (
-    FunctionCompiler,
-    KernelCompiler,
-    LeanCompiler,
-    LinkedFunction,
-)
+from per_obspy.kernels._linking import FunctionCompiler, LeanCompiler, LinkedFunction
 
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
@@ -34,8 +29,6 @@ OPTIONS: dict[str, Any] = {
     "boundscheck": False,
     # No function pointer for C, which no kernel needs
     "no_cfunc_wrapper": True,
-    # One step from all functions of a kernel to machine code
-    "pipeline_class": KernelCompiler,
 }
 
 

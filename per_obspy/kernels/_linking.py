@@ -1,124 +1,59 @@
 """
-Machine code of each kernel generated once, with that of all functions that it calls.
+Machine code generated once per kernel that Python calls, with that of all functions it calls.
 
-Numba optimises a compiled function together with everything that it calls, generates machine code
-for all of it and wraps it for Python. In a chain of calls the last function goes through this as
-often as the chain is long. Here a function that kernels call is translated to LLVM's intermediate
-code only; a kernel that Python calls links the code of all, and generates machine code once.
+Numba generates machine code for every compiled function, and again for everything that it calls:
+in a chain of calls the last function goes through this as often as the chain is long. Here a
+function that kernels call is translated to LLVM's intermediate code only, and a kernel links it.
+Compiling takes about half as long. Results do not depend on it: where Numba's internals differ
+from those used here, functions are compiled as Numba does by itself.
 
-Scalar functions are not even optimised before that. Those with loops over arrays are: the loops
-become vectors before they are merged into their callers, without which spectra take some percent
-longer.
-
-Half of the time goes into Numba's own Python code, which :mod:`per_obspy.kernels._quick` shortens,
-besides leaving out passes for what kernels do not contain.
+Internals used (the same in Numba 0.61 to 0.68): the library of a compiler's state (as
+``BaseContext.compile_subroutine`` sets it), three flags, ``JITCodeLibrary.finalize``, and
+``Dispatcher.compile``.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
-from numba.core import event, sigutils, untyped_passes
+from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
-from per_obspy.kernels._quick import KnownCalls, QuickFlags, kept_garbage, short_error
 
-#: Passes for closures, comprehensions, ``with``, and loops over tuples of several types.
-UNUSED_PASSES = {
-    untyped_passes.WithLifting,
-    untyped_passes.InlineClosureLikes,
-    untyped_passes.RewriteDynamicRaises,
-    untyped_passes.MakeFunctionToJitFunction,
-    untyped_passes.InlineInlinables,
-    untyped_passes.FindLiterallyCalls,
-    untyped_passes.LiteralUnroll,
-    untyped_passes.LiteralPropagationSubPipelinePass,
-}
-
-
-class KernelLibrary(JITCodeLibrary):
-    """Code of a kernel, linked with that of all functions that it calls, directly or not."""
-
-    def add_linking_library(self, library: Any) -> None:
-        """Add the code of a function that is called, and of those that this one calls."""
-        super().add_linking_library(library)
-        if isinstance(library, FunctionLibrary):
-            self._linking_libraries += library._linking_libraries
-
-    def finalize(self) -> None:
-        """Link each library after all that call it, then generate machine code."""
-        self._linking_libraries = self._callers_first()
-        super().finalize()
-
-    def _callers_first(self) -> list[Any]:
-        """Return the libraries, once each, those that call before those that are called."""
-        # Code that is not called yet is left out when it is linked. Every mention of a library is
-        # followed by one of each library that it calls.
-        return list(dict.fromkeys(reversed(self._linking_libraries)))[::-1]
-
-
-class FunctionLibrary(KernelLibrary):
+class FunctionLibrary(JITCodeLibrary):
     """Intermediate code of a function and of those that it calls, optimised."""
 
     def finalize(self) -> None:
         """Link and optimise; no machine code is generated."""
-        for library in self._callers_first():
+        for library in dict.fromkeys(self._linking_libraries):
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        self._linking_libraries.clear()
-        self._optimize_final_module()
+        self._optimise()
         self._finalized = True
+
+    def _optimise(self) -> None:
+        self._optimize_final_module()
 
 
 class LeanLibrary(FunctionLibrary):
-    """Intermediate code of one function; the functions that it calls are listed, not linked."""
+    """The same code, of which the optimisation is left to the kernel."""
 
     def _optimize_functions(self, module: Any) -> None:
-        """Leave the optimisation to the kernel; only set the layout of data for it."""
+        # Only the layout of data, which all linked modules share
         module.data_layout = self._codegen._data_layout
 
-    def finalize(self) -> None:
-        """End the changes."""
-        self._finalized = True
+    def _optimise(self) -> None:
+        pass
 
 
-class LeanPipeline(Compiler):
-    """Numba's compiler without what kernels do not need."""
+class FunctionCompiler(Compiler):
+    """Numba's compiler up to intermediate code."""
 
-    def compile_extra(self, func: Any) -> Any:
-        """Compile a function of Python, with options that compare quickly."""
-        self.state.flags = QuickFlags(self.state.flags)
-        self.state.typingctx = KnownCalls(self.state.typingctx)
-        with kept_garbage(), short_error():
-            return super().compile_extra(func)
+    library: ClassVar[type[FunctionLibrary]] = FunctionLibrary
 
     def define_pipelines(self) -> Any:
-        """Return the passes that kernels need."""
-        (passes,) = super().define_pipelines()
-        passes.passes = [one for one in passes.passes if one[0] not in UNUSED_PASSES]
-        return [passes]
-
-
-class KernelCompiler(LeanPipeline):
-    """Compiler of kernels that Python calls."""
-
-    def define_pipelines(self) -> Any:
-        """Return the passes, which write to a library that links all functions."""
-        state = self.state
-        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        # the library is stored on disk later
-        state.library.enable_object_caching()
-        return super().define_pipelines()
-
-
-class FunctionCompiler(LeanPipeline):
-    """Compiler of functions that kernels call."""
-
-    library = FunctionLibrary
-
-    def define_pipelines(self) -> Any:
-        """Return the passes up to intermediate code."""
+        """Return the passes, which write to a library of this class."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
@@ -128,7 +63,7 @@ class FunctionCompiler(LeanPipeline):
 
 
 class LeanCompiler(FunctionCompiler):
-    """Compiler of scalar functions."""
+    """The same for scalar functions, which are optimised with their callers only."""
 
     library = LeanLibrary
 
@@ -140,7 +75,7 @@ class LinkedFunction(CPUDispatcher):
     Parameters
     ----------
     kernel : Dispatcher
-        The function as a kernel that Python calls, compiled by `KernelCompiler`.
+        The function as a kernel that Python calls.
     compiler : type
         `FunctionCompiler` or `LeanCompiler`.
     """
@@ -150,20 +85,21 @@ class LinkedFunction(CPUDispatcher):
 
     def __init__(self, kernel: Any, compiler: type[FunctionCompiler]) -> None:
         """Take the options of the kernel and its place on disk; compilation waits for a call."""
-        options = {"targetoptions": kernel.targetoptions, "pipeline_class": compiler}
-        super().__init__(kernel.py_func, **options)
+        super().__init__(
+            kernel.py_func, targetoptions=kernel.targetoptions, pipeline_class=compiler
+        )
         self.kernel = kernel
         self._cache = kernel._cache
-        self._is_optimised_alone = compiler.library is FunctionLibrary
+        self._is_lean = compiler is LeanCompiler
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the kernel."""
         return self.kernel(*arguments, **named)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return what the typing of a call needs; one code serves all constants of a type."""
+        """Return what the typing of a call needs; one lean code serves all constants of a type."""
         # Merged into its caller before it is optimised, the code knows the constants of the call
-        if not self._is_optimised_alone:
+        if self._is_lean:
             args = tuple(map(unliteral, args))
             kws = {name: unliteral(kind) for name, kind in kws.items()}
         return super().get_call_template(args, kws)
@@ -175,11 +111,13 @@ class LinkedFunction(CPUDispatcher):
             known: Any = self.overloads.get(tuple(arguments))
             if known is not None:
                 return known.entry_point
-            details = {"dispatcher": self, "args": arguments, "return_type": result}
-            with event.trigger_event("numba:compile", data=details):
-                code = self._compiler.compile(arguments, result)
-            # a key in place of the address that no machine code has
-            code = code._replace(entry_point=object())
-            self.targetctx.insert_user_function(code.entry_point, code.fndesc, [code.library])
+            try:
+                # A key in place of the address that no machine code has
+                code = self._compiler.compile(arguments, result)._replace(entry_point=object())
+                self.targetctx.insert_user_function(code.entry_point, code.fndesc, [code.library])
+            except (AssertionError, AttributeError, NotImplementedError, TypeError):
+                # Another Numba: the function with machine code of its own
+                self.kernel.compile(sig)
+                code = self.kernel.overloads[tuple(arguments)]
             self.overloads[tuple(arguments)] = code
             return code.entry_point

@@ -15,7 +15,6 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.kernels._quick import kept_garbage
 from per_obspy.pounding.correlation import worst_azimuth
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.relative import (
@@ -142,10 +141,13 @@ PARTS: dict[str, Callable[[], None]] = {
 
 def compile_part(name: str) -> str:
     """Compile one of `PARTS`, or everything that screening needs, and return its name."""
-    with kept_garbage():
+    # Compilation makes many objects and few cycles: searches for them free next to nothing
+    gc.disable()
+    try:
         PARTS.get(name, compile_screening)()
-        # A search through what is left of it takes more than a second, and frees what is not missed
         gc.freeze()
+    finally:
+        gc.enable()
     return name
 
 

@@ -26,8 +26,6 @@ from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
-from per_obspy.full_vectors import FULL_WIDTH, use_full_vectors
-
 FOLDER = Path(__file__).parent
 PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
 SCRIPTS = (
@@ -102,18 +100,16 @@ def machine() -> str:
         if {"cpu family", "model"} <= facts.keys():
             model += f" (family {facts['cpu family']}, model {facts['model']})"
     system = f"{platform.system()}, Python {platform.python_version()}"
-    is_full = FULL_WIDTH in os.environ.get("NUMBA_CPU_FEATURES", "")
+    is_full = "-prefer-256-bit" in os.environ.get("NUMBA_CPU_FEATURES", "")
     vectors = "vectors of full width" if is_full else "width of vectors by the compiler"
     return f"{model}, {vectors}, {os.cpu_count()} processors, {system}"
 
 
-def choose_vectors() -> None:
-    """Choose the width of vectors for a benchmark, before Numba is imported, and print it."""
-    if Path(sys.argv[0]).resolve().parent == FOLDER.resolve():
-        use_full_vectors()
-        # Not once more by each process that the benchmark starts
-        if current_process().name == "MainProcess":
-            print(machine(), flush=True)
+def print_machine() -> None:
+    """Print the machine of a benchmark, not once more by each process that it starts."""
+    is_benchmark = Path(sys.argv[0]).resolve().parent == FOLDER.resolve()
+    if is_benchmark and current_process().name == "MainProcess":
+        print(machine(), flush=True)
 
 
 def revision() -> str:
@@ -231,7 +227,7 @@ def main(path: Path, scripts: list[str]) -> None:
 
 
 # Every benchmark imports this module before Numba
-choose_vectors()
+print_machine()
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]), sys.argv[2:])

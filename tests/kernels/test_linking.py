@@ -6,7 +6,7 @@ from numba import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
-from per_obspy.kernels import _jit
+from per_obspy.kernels import _jit, _linking
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="kernels run uncompiled")
 
@@ -69,6 +69,22 @@ def test_only_the_kernel_that_python_calls_has_machine_code(monkeypatch):
     monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", listed)
     assert outer(1.0) == 5.0
     assert [name for name in generated if name in {"inner", "middle", "outer"}] == ["outer"]
+
+
+def test_where_internals_of_numba_differ_functions_are_compiled_as_it_does_by_itself(monkeypatch):
+    # catches a new Numba under which no kernel runs, though every function compiles
+    @_jit.lean
+    def inner(values):
+        return 2.0 * values[0]
+
+    @_jit.kernel
+    def outer(values):
+        return inner(values) + 1.0
+
+    monkeypatch.setattr(_linking.FunctionCompiler, "library", None)
+    monkeypatch.setattr(_linking.LeanCompiler, "library", None)
+    assert outer(VALUES) == 3.0
+    assert inner.kernel.overloads
 
 
 def test_a_function_that_python_calls_too_gives_the_same():
