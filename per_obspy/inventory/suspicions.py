@@ -365,7 +365,7 @@ class _FileAccount:
         n = self._count
         # Outlines have whatever gap was asked for, with decimals
         is_drawn = self._is_drawn and n["whole"] < n["gaps"]
-        gaps = _gap_rules(n, is_drawn, np.count_nonzero(self._inches) >= 3)
+        gaps = _gap_rules(n, is_drawn, int(self._inches.sum()) >= 3)
         rules = [*gaps, *_size_rules(n), *_other_rules(n)]
         # Of each group the first rule that holds
         by_group = dict[str, _Finding]()
@@ -682,7 +682,7 @@ def _astray_azimuths(n: Counter[str]) -> Iterator[_Finding]:
     # Where the azimuth of an axis is given, half of them point backwards
     if n["compared"] < 3 or 4 * n["astray"] < n["compared"]:
         return
-    others, units = f"{n['astray']} of {n['compared']} do not follow the positions", ()
+    others, units = f"{n['astray']} of {n['compared']} do not follow the positions", _Units()
     forms = {
         "in_radians": "in radians",
         "backwards": "backwards",
