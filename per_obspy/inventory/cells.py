@@ -168,7 +168,8 @@ def read_numbers(name: str, cells: pd.Series, form: CellForm = PLAIN_CELLS) -> N
         raw = cells.to_numpy(dtype=np.float64, na_value=np.nan)
         unit = form.units.get(name)
         numbers = raw if unit is None else raw * unit.numerator / unit.denominator
-        deviations, is_none, notes = np.zeros_like(raw), placeholders(name, raw, numbers), {}
+        deviations, is_none = np.zeros_like(raw), placeholders(name, raw, numbers)
+        notes = dict[int, str]()
     else:
         numbers, deviations, is_none, notes = _numbers_of_texts(name, cells, form)
     # Numbers that mean nothing are kept aside, as a message may need them
@@ -341,16 +342,15 @@ def _estimate(text: str, word: str, form: CellForm) -> Value | None:
 def _range(text: str, word: str, form: CellForm) -> Value | None:
     """Return a gap with a deviation, or one between two, of which the first may lack the unit."""
     for kind, first, second in _splits(word):
-        unit = next(_units(second), None)
-        units = {**form.units, "gap": unit}
-        inner_form = form._replace(units=units, gap_unit="") if unit else form
         # The unit may be behind both
-        ends = _bound(first, inner_form), _bound(second, form)
-        if ends[0] is not None and ends[1] is not None:
+        unit = next(_units(second), None)
+        of_first = form._replace(units={"gap": unit}, gap_unit="") if unit else form
+        low, high = _bound(first, of_first), _bound(second, form)
+        if low is not None and high is not None:
             if kind == "±":
-                return _noted(text, ends[0], ends[1])
-            if min(ends) >= 0.0:
-                return _even(text, min(ends), max(ends))
+                return _noted(text, low, high)
+            if min(low, high) >= 0.0:
+                return _even(text, min(low, high), max(low, high))
     return None
 
 
@@ -451,14 +451,14 @@ def read_texts(name: str, cells: pd.Series) -> tuple[pd.Series, dict[int, str]]:
         return texts, {}
     # Each text once
     codes, distinct = pd.factorize(texts)
-    choices = [_choice(column, text) for text in distinct]
+    choices = {text: _choice(column, text) for text in distinct}
     allowed = f"is unknown, expected {', '.join(column.choices)}"
     notes = [
         f"{name} = {shortened(text, LONGEST)!r} {allowed}" if choice is None else ""
-        for text, choice in zip(distinct, choices, strict=True)
+        for text, choice in choices.items()
     ]
-    values = np.array([choice or "" for choice in choices], dtype=object)[codes]
-    return pd.Series(values), _by_row(codes, notes)
+    values = texts.map({text: choice or "" for text, choice in choices.items()})
+    return values, _by_row(codes, notes)
 
 
 def _choice(column: Column, text: str) -> str | None:

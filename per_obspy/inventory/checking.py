@@ -109,8 +109,10 @@ def _accepted(
     for position, reason in faults:
         reasons[position].append(reason)
     bad, names = sorted(reasons), pairs["pair_id"]
+    is_good = np.ones(len(pairs), dtype=bool)
+    is_good[bad] = False
     # Both in the order of the table
-    accepted = pairs.drop(index=bad).reset_index(drop=True)
+    accepted = pairs[is_good].reset_index(drop=True)
     accepted.attrs["rejected"] = Rejections(
         Rejection("pair", names.iloc[i], source, int(lines[i]), tuple(reasons[i])) for i in bad
     )
@@ -222,20 +224,21 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
 def _impossible_sizes(pair: PairRows) -> Iterator[Fault]:
     """Yield rows whose sizes are missing, or contradict each other."""
     # Of each building one size is needed
-    for names in ONE_OF:
-        for i in _rows(pair.table.reindex(columns=names).isna().all(axis=1)):
-            notes = _noted(pair.table, i, names)
+    for one, names in zip(pair.buildings, ONE_OF, strict=True):
+        for i in _rows(np.isnan([one.height, one.storeys, one.period]).all(0)):
             reason = f"none of {', '.join(names)} is a number, one is needed"
-            yield i, f"{reason}: {notes}" if notes else reason
+            yield i, f"{reason}: {_noted(pair.table, i, names)}".removesuffix(": ")
     # Floors are neither lower than doors nor higher than halls
     low, high = STOREY_HEIGHTS
     for one in pair.buildings:
-        height, storeys, k = one.height, one.storeys, one.suffix
+        height, storeys = one.height, one.storeys
         is_wrong = (one.storey < low) | (one.storey > high)
         for i in _rows((height > 0.0) & (storeys > 0.0) & is_wrong):
-            sizes = f"height{k} = {height[i]:g} m with storeys{k} = {storeys[i]:g}"
-            floors = f"floors of {one.storey[i]:.3g} m, outside {low:g} to {high:g} m"
-            yield i, f"{sizes} makes {floors}"
+            sizes = (
+                f"height{one.suffix} = {height[i]:g} m with storeys{one.suffix} = {storeys[i]:g} "
+                "makes floors"
+            )
+            yield i, f"{sizes} of {one.storey[i]:.3g} m, outside {low:g} to {high:g} m"
 
 
 def _impossible_contacts(pair: PairRows) -> Iterator[Fault]:

@@ -135,4 +135,4 @@ def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatA
     array([0.3  , 0.469])
     """
     *_, exponent, _, scatter = _coefficients(system)
-    return np.hypot(scatter, exponent * np.asarray(height_log_std))
+    return np.asarray(np.hypot(scatter, exponent * np.asarray(height_log_std)))

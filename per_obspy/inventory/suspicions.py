@@ -365,7 +365,7 @@ class _FileAccount:
         n = self._count
         # Outlines have whatever gap was asked for, with decimals
         is_drawn = self._is_drawn and n["whole"] < n["gaps"]
-        gaps = _gap_rules(n, is_drawn, np.count_nonzero(self._inches) >= 3)
+        gaps = _gap_rules(n, is_drawn, int(self._inches.sum()) >= 3)
         rules = [*gaps, *_size_rules(n), *_other_rules(n)]
         # Of each group the first rule that holds
         by_group = dict[str, _Finding]()
@@ -428,11 +428,11 @@ class _FileAccount:
     def _around(self, east: NDArray[np.int64], north: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the pairs in cells of one degree and the eight around each."""
         grid = np.pad(self._cells.reshape(360, 180), ((0, 0), (1, 1)))
-        ways = product((-1, 0, 1), repeat=2)
-        around = np.sum([np.roll(grid, way, axis=(0, 1)) for way in ways], axis=0)
-        # No cell is beyond a pole
-        pairs = around[east + 180, np.clip(north, -91, 90) + 91]
-        return np.where(np.abs(north) > 90, 0, pairs)
+        # Beyond the poles is no cell, beyond the date line is the first one
+        rows = np.clip(north[:, None] + 91 + np.array([-1, 0, 1]), 0, 181)
+        rows[np.abs(north) > 90] = 0
+        columns = (east[:, None] + 180 + np.array([-1, 0, 1])) % 360
+        return np.asarray(grid[columns[:, :, None], rows[:, None, :]].sum(axis=(1, 2)))
 
 
 def _odd_rows(pair: PairRows) -> Iterator[_Mask]:
@@ -682,7 +682,7 @@ def _astray_azimuths(n: Counter[str]) -> Iterator[_Finding]:
     # Where the azimuth of an axis is given, half of them point backwards
     if n["compared"] < 3 or 4 * n["astray"] < n["compared"]:
         return
-    others, units = f"{n['astray']} of {n['compared']} do not follow the positions", ()
+    others, units = f"{n['astray']} of {n['compared']} do not follow the positions", _Units()
     forms = {
         "in_radians": "in radians",
         "backwards": "backwards",

@@ -6,7 +6,7 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.checking import check_columns, checked_pairs
-from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF, SYSTEMS
+from per_obspy.inventory.schema import COLUMNS, ONE_OF, SYSTEMS
 
 
 def _row(**changes):
@@ -193,13 +193,6 @@ def test_duplicates_after_the_first_are_rejected():
     assert pairs.attrs["rejected"][0].reasons == ("pair_id = 'a' occurs in an earlier row already",)
 
 
-def test_good_rows_survive_bad_ones():
-    table = pd.DataFrame([_row(pair_id=str(i), gap=-1.0 if i % 3 == 0 else 0.1) for i in range(9)])
-    pairs = checked_pairs(table, "pairs.csv")
-    assert pairs["pair_id"].tolist() == ["1", "2", "4", "5", "7", "8"]
-    assert pairs.index.tolist() == list(range(6))
-
-
 @pytest.mark.parametrize("empty", ["", " ", "NA", "nan", "null", "-", None])
 def test_an_empty_cell_of_an_optional_column_is_missing(empty):
     pairs = checked_pairs(
@@ -229,13 +222,6 @@ def test_whole_table_faults():
         checked_pairs(pd.DataFrame([_row()]).drop(columns="gap"), "pairs.csv")
     with pytest.raises(CatalogError, match=r"pairs.csv: the table has no rows"):
         checked_pairs(pd.DataFrame([_row()]).iloc[:0], "pairs.csv")
-
-
-def test_every_column_has_a_unit_and_a_meaning():
-    for column in (*COLUMNS.values(), *COMPLETED.values()):
-        assert column.meaning
-        assert bool(column.unit) == (column.dtype == "float64")
-        assert column.low <= column.high
 
 
 def test_rejections_are_shared_by_every_copy_of_the_table():

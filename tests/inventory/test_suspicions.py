@@ -417,11 +417,6 @@ def test_good_tables_raise_no_suspicion(kind):
     assert (sentences, set(names)) == ([], {""})
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.3])
-def test_ordinary_gaps_are_no_other_unit(gap):
-    assert suspected(town(3, gap=[gap, 0.05, 0.0]))[0] == []
-
-
 def test_round_gaps_need_evidence():
     assert suspected(town(5, gap=[1.0, 2.0, 2.0, 3.0, 1.5]))[0] == []
     (sentence,) = suspected(town(6, gap=[1.0, 2.0, 2.0, 3.0, 1.0, 0.0]))[0]

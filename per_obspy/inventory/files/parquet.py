@@ -42,7 +42,7 @@ def open_parquet(file: Path, given: TableForm) -> Contents:
             if name == IDENTIFIER and pa.types.is_nested(schema.field(heading).type):
                 pa.nulls(1, schema.field(heading).type).cast(pa.string())
     blocks = partial(_parquet_rows, file, meanings)
-    return Contents(str(file), meanings, meanings.names, blocks, is_text=False)
+    return Contents(str(file), meanings, blocks, is_text=False)
 
 
 def _parquet_rows(file: Path, meanings: Meanings, places: Sequence[int]) -> Iterator[RawRows]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
 from per_obspy.inventory.files.headings import Meanings
+from per_obspy.inventory.files.text_cells import given_text
 
 
 class RawRows(NamedTuple):
@@ -33,8 +34,6 @@ class Contents(NamedTuple):
     source: str
     #: Of its header.
     meanings: Meanings
-    #: Of its columns, by the schema where it knows them; empty for a column without a name.
-    names: list[str]
     #: ``blocks(places)`` yields these columns, named by their place, with the broken lines: every
     #: line of the file is in one of the rows, broken or blank.
     blocks: Callable[[Sequence[int]], Iterator[RawRows]]
@@ -46,6 +45,12 @@ class Contents(NamedTuple):
     separator: str = ""
     #: Whether another encoding would give other letters, and no heading decides.
     is_doubtful: bool = False
+
+    @property
+    def names(self) -> list[str]:
+        """Of its columns, by the schema where it knows them; empty for a column without a name."""
+        names = self.meanings.names
+        return [given_text(name.strip()) for name in names] if self.is_text else names
 
 
 def stripped(names: pa.Array | pa.ChunkedArray) -> pa.StringArray:

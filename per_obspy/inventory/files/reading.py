@@ -249,10 +249,7 @@ def _checked(
     rows: RawRows, repeated: NDArray[np.bool_] | None, odd: NDArray[np.object_]
 ) -> pd.DataFrame:
     """Check raw rows and add the broken lines to the rejected rows, in the order of the file."""
-    # Metadata that pandas stored in the file could turn a column into the index
-    table: pd.DataFrame = rows.table.replace_schema_metadata(None).to_pandas()
-    pairs = checked_pairs(_with_odd(table, odd), rows.source, rows.lines, repeated)
+    pairs = checked_pairs(_with_odd(rows.table.to_pandas(), odd), rows.source, rows.lines, repeated)
     rejected: list[Rejection] = [*pairs.attrs["rejected"], *rows.broken]
-    rejected.sort(key=lambda rejection: rejection.row or 0)
-    pairs.attrs["rejected"] = Rejections(rejected)
+    pairs.attrs["rejected"] = Rejections(sorted(rejected, key=lambda row: row.row or 0))
     return pairs

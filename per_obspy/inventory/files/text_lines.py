@@ -31,7 +31,6 @@ from per_obspy.files import looks_like
 from per_obspy.inventory.cells import is_unknown, read_number
 from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
-from per_obspy.inventory.files.text_cells import given_text
 from per_obspy.inventory.schema import missing_columns
 
 #: Characters read at once.
@@ -119,7 +118,6 @@ def open_text(file: Path, given: TableForm) -> Contents:
     return Contents(
         source=str(file),
         meanings=meanings,
-        names=[given_text(name.strip()) for name in meanings.names],
         blocks=partial(_text_rows, file, form),
         form=tuple(texts),
         separator=form.separator,
@@ -139,7 +137,6 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     encodings = possible_encodings(file, given.encoding)
     forms = list(_possible_forms(file, given, list(encodings)))
     if not forms:
-        check_text(file)  # names the line that is not UTF-8
         raise CatalogError(str(file), "line 1: no header can be read")
     best = max(forms, key=_rank)
     if len(best.meanings.columns) < _FEWEST:
@@ -173,7 +170,7 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
     """Yield every form that a text table may have, the usual ones first."""
     separators = (given.separator,) if given.separator else (",", *OTHER_SEPARATORS)
     for encoding in encodings:
-        head = _first_lines(file, encoding)
+        head = next(_whole_lines(file, encoding), "").split("\n")[:HEADER_LINES]
         for separator in separators:
             for number, end, cells, fault in _headers(head, separator):
                 meanings = meanings_of(cells, given, str(file), must_have=False)
@@ -181,15 +178,6 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
                 # Any bytes may be Japanese: only a heading decides
                 if encoding != JAPANESE or given.encoding or "ja" in languages:
                     yield TextForm(encoding, separator, number, end, meanings, fault)
-
-
-def _first_lines(file: Path, encoding: str) -> list[str]:
-    """Return the first lines of a file."""
-    try:
-        block = next(_whole_lines(file, encoding), "")
-    except UnicodeDecodeError:
-        return []
-    return block.split("\n")[:HEADER_LINES]
 
 
 def _headers(lines: Sequence[str], separator: str) -> Iterator[tuple[int, int, list[str], str]]:

@@ -29,7 +29,6 @@ from per_obspy.errors import CatalogError, printable, require_extra, shortened
 from per_obspy.files import looks_like
 from per_obspy.inventory.files.headings import Meanings, meanings_of
 from per_obspy.inventory.files.raw_rows import Contents, RawRows
-from per_obspy.inventory.files.text_cells import given_text
 from per_obspy.inventory.schema import missing_columns
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
 
@@ -105,16 +104,15 @@ def open_workbook(file: Path, given: TableForm) -> Contents:
     source = f"{file}, sheet {sheet.name!r}"
     meanings = meanings_of(sheet.meanings.cells, given, source)
     rows = sheets[sheet.name].slice(sheet.header, MOST_ROWS).select(range(len(meanings.cells)))
-    rows, first = _computed(source, rows, sheet.header + 1, meanings), sheet.header + 1
-    lines = np.arange(first, first + len(rows))
+    rows = _computed(source, rows, sheet.header + 1, meanings)
+    lines = np.arange(len(rows)) + sheet.header + 1
     # The sheet is named in messages, and all of its rows are one block
-    header = f" with the header in row {sheet.header}" if sheet.header > 1 else ""
+    form = f"sheet {sheet.name!r} with the header in row {sheet.header}"
     return Contents(
         source=source,
         meanings=meanings,
-        names=[given_text(name.strip()) for name in meanings.names],
         blocks=lambda places: iter([RawRows(source, rows.select(list(places)), lines, ())]),
-        form=(f"sheet {sheet.name!r}{header}",),
+        form=(form.removesuffix(" with the header in row 1"),),
     )
 
 

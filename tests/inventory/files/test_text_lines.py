@@ -88,13 +88,6 @@ def test_lines_of_rejected_rows_are_those_of_the_file(write):
         assert rejected.reasons == ("longitude_1 = 'wide' is not a number",)
 
 
-def test_an_open_quotation_loses_its_own_row_only_with_semicolons(write):
-    text = text_of(NAMES, ROWS, ";", ",").replace("corner", '"corner')
-    pairs = read_pairs(write(text))
-    assert pairs["pair_id"].tolist() == ["b", "c"]
-    assert pairs.attrs["rejected"][0].row == 2
-
-
 def test_a_stray_comma_in_a_plain_column_leaves_the_other_cells_alone(write):
     # would catch a column of points that becomes one of commas because of one cell
     text = text_of(NAMES, ROWS).replace("15.5", "12.345")
@@ -128,13 +121,6 @@ def test_the_form_is_of_a_file():
     with pytest.raises(CatalogError, match="columns is of a pair table: give its file"):
         checked(Pairs, {"catalog": "c.toml", "columns": {"gap": "x"}})
     assert checked(Pairs, {"file": "p.csv", "decimal": ","}).form == TableForm(decimal=",")
-
-
-@pytest.mark.parametrize("block", [1, 2, 3, 1 << 20])
-def test_a_character_may_lie_across_blocks(write, monkeypatch, block):
-    # would catch blocks that are decoded by themselves
-    monkeypatch.setattr(text_lines, "BLOCK", block)
-    assert check_text(write("pair_id,note\na,café €\n".encode())) == 2
 
 
 @pytest.mark.parametrize(
