@@ -55,16 +55,9 @@ def without_repetitions(
     outlines: pa.Array, table: pd.DataFrame, source: str
 ) -> tuple[Buildings, tuple[Rejection, ...]]:
     """
-    Return buildings without those that repeat an earlier outline or identifier.
+    Return buildings without those that repeat an earlier outline or ``building_id``.
 
-    Parameters
-    ----------
-    outlines : pa.Array
-        WKB in degrees.
-    table : DataFrame
-        With ``building_id``; the index is the number of the feature.
-    source : str
-        The file, for messages.
+    Outlines are WKB in degrees; the index of the table is the number of the feature.
     """
     identifiers = table["building_id"]
     same_shape, same_name = _repeated(outlines), identifiers.duplicated().to_numpy()
@@ -94,13 +87,6 @@ def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
 def projected(buildings: Buildings, source: str) -> tuple[Buildings, Outlines]:
     """
     Return buildings with their places, degrees, and areas, m2, and their outlines in metres.
-
-    Parameters
-    ----------
-    buildings : Buildings
-        Their table need not have places and areas.
-    source : str
-        The file, for messages.
 
     Raises
     ------
@@ -160,12 +146,7 @@ def write_buildings(buildings: Buildings, path: Path) -> None:
     """
     Write buildings as GeoParquet, whole or not at all.
 
-    Parameters
-    ----------
-    buildings : Buildings
-        With ``longitude`` and ``latitude``.
-    path : Path
-        ``.parquet``. Outlines are the column ``geometry``, longitude and latitude in degrees.
+    Outlines are the column ``geometry``, longitude and latitude in degrees.
     """
     table = pa.Table.from_pandas(buildings.table, preserve_index=False)
     outlines = buildings.outlines.cast(pa.binary())

@@ -44,14 +44,7 @@ _FLAT = 1e-6
 
 def read_citygml(file: Path, source: str) -> RawLayer:
     """
-    Read the buildings of a city model.
-
-    Parameters
-    ----------
-    file : Path
-        CityGML 1.0 or 2.0.
-    source : str
-        Name of the file, for messages.
+    Read the buildings of a city model; messages name its source.
 
     Raises
     ------

@@ -44,12 +44,7 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
     """
     Read a file of features, one per line; blank lines and record separators are skipped.
 
-    Parameters
-    ----------
-    file : Path
-        UTF-8. A line that is no feature is a separate fault.
-    source : str
-        Name of the file, for messages.
+    A line that is no feature is a separate fault.
 
     Raises
     ------
@@ -147,13 +142,6 @@ def is_asset_json(head: bytes) -> bool:
 def read_asset_json(file: Path, source: str) -> RawLayer:
     """
     Read assets: one, a list of them, or a FeatureCollection.
-
-    Parameters
-    ----------
-    file : Path
-        Its size is limited to ``LARGEST_ASSETS``.
-    source : str
-        Name of the file, for messages.
 
     Raises
     ------
