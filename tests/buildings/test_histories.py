@@ -112,11 +112,6 @@ def test_a_row_does_not_depend_on_its_company():
         np.testing.assert_array_equal(together[name][3:], alone[name])
 
 
-def test_a_negative_gap_is_refused():
-    with pytest.raises(ValueError, match="gap"):
-        outcomes(contacts(2, gap=np.array([0.0, -0.1])))
-
-
 def members(table, first=None):
     count = len(table["gap"])
     ends = np.array([0, count] if first is None else first)
