@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from per_obspy.buildings.chains import ROW_FLAGS, chains_of
+from per_obspy.buildings.chains import ROW_FLAGS, chains_of, joints_of
 from per_obspy.buildings.contacts import contacts_of
-from per_obspy.buildings.joints import joints_of
 
 from .street import street, table_of, terrace
 
