@@ -8,6 +8,7 @@ whole numbers of all pairs are in memory: texts are sorted by a database of boun
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import chain, pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -21,7 +22,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from per_obspy.buildings.chains import Chains, chains_of
+from per_obspy.buildings.chains import Chains, chains_of, joints_of
 from per_obspy.buildings.contacts import (
     PROPERTIES,
     BoolArray,
@@ -32,20 +33,12 @@ from per_obspy.buildings.contacts import (
     numbers_in,
 )
 from per_obspy.buildings.histories import NEEDED
-from per_obspy.buildings.joints import joints_of
 from per_obspy.buildings.sides import OF_PAIRS
-from per_obspy.buildings.streams import (
-    GROUP,
-    one_thread_database,
-    stored_rows,
-    tables_of,
-    whole_groups,
-)
 from per_obspy.checks import FloatArray
 from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.tables.parts import batches
+from per_obspy.tables.parts import batches, bounded_database
 from per_obspy.tables.ranked_table import RankedTable
 from per_obspy.tables.table_files import regrouped
 
@@ -82,6 +75,13 @@ PIECE, CHUNK = 20_000, 10_000
 
 #: Rows of a table, and sorted identifiers, that are read together.
 BATCH, SORTED = 20_000, 100_000
+
+#: Rows of a group of a Parquet file.
+GROUP = 10_000
+
+#: Threads of the database: one needs a quarter less processor time than two.
+THREADS = 1
+
 
 #: Numbers of the buildings of a pair, and of its piece.
 NUMBERS = [(name, pa.int32()) for name in ("code_1", "code_2", "piece")]
@@ -447,3 +447,49 @@ def _groups(file: Path) -> Iterator[pa.Table]:
         names = [name for name in OF_CHUNKS if name in stored.schema_arrow.names]
         for group in range(stored.num_row_groups):
             yield stored.read_row_group(group, columns=names, use_threads=False).select(names)
+
+
+@contextmanager
+def one_thread_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Yield a database of one thread, which leaves what is too much to a folder inside."""
+    with bounded_database(folder) as database:
+        database.execute(f"SET threads = {THREADS}")
+        yield database
+
+
+@contextmanager
+def stored_rows(file: Path) -> Iterator[pa.RecordBatchReader]:
+    """Yield the rows of a Parquet file once, for a database; a dataset would read far ahead."""
+    with pq.ParquetFile(file.absolute(), pre_buffer=False) as stored:
+        rows = stored.iter_batches(GROUP, use_threads=False)
+        yield pa.RecordBatchReader.from_batches(stored.schema_arrow, rows)
+
+
+def tables_of(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.Table]:
+    """Yield the rows of a query as tables of some rows each."""
+    for batch in batches(database, query, size):
+        yield pa.Table.from_batches([batch])
+
+
+def whole_groups(tables: Iterable[pa.Table], name: str) -> Iterator[pa.Table]:
+    """
+    Yield the rows of tables cut only where a number changes.
+
+    Parameters
+    ----------
+    tables : iterable of Table
+        At least one, none of them empty.
+    name : str
+        Column of the numbers, which never fall.
+    """
+    waiting = list[pa.Table]()
+    for table in tables:
+        number = table[name].to_numpy()
+        last = waiting[-1][name][-1].as_py() if waiting else number[0]
+        # The last group may go on in the next table
+        whole = int(np.searchsorted(number, number[-1]))
+        if whole or number[0] != last:
+            yield pa.concat_tables([*waiting, table.slice(0, whole)]).combine_chunks()
+            waiting = []
+        waiting.append(table.slice(whole))
+    yield pa.concat_tables(waiting).combine_chunks()

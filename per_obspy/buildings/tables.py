@@ -19,15 +19,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.buildings.columns import BUILDING_FLAGS, BUILDINGS, FLAGS, ROWS
-from per_obspy.buildings.search import AREA
-from per_obspy.buildings.sides import OF_PAIRS, building_table, directions
-from per_obspy.buildings.streams import (
+from per_obspy.buildings.search import (
+    AREA,
     GROUP,
     one_thread_database,
     stored_rows,
     tables_of,
     whole_groups,
 )
+from per_obspy.buildings.sides import OF_PAIRS, building_table, directions
 from per_obspy.config import Run, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column

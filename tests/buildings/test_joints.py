@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from per_obspy.buildings.chains import MOST_CONTACTS, joints_of
 from per_obspy.buildings.contacts import contacts_of
-from per_obspy.buildings.joints import MOST_CONTACTS, joints_of
 
 from .street import street, table_of
 

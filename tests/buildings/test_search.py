@@ -7,8 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from per_obspy.buildings import search
-from per_obspy.buildings.search import serving_stations
-from per_obspy.buildings.streams import one_thread_database, whole_groups
+from per_obspy.buildings.search import one_thread_database, serving_stations, whole_groups
 from per_obspy.config.pairs import Rows
 from per_obspy.tables.ranked_table import ranked_table
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.simulation import stochastic
+from per_obspy.simulation import earthquake as stochastic
 
 FREQUENCY = np.geomspace(0.01, 50.0, 40)
 

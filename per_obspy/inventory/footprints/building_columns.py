@@ -54,23 +54,11 @@ ENOUGH = 20
 
 def building_columns(attributes: pd.DataFrame, names: Mapping[str, str], file: str) -> pd.DataFrame:
     """
-    Return the attributes of a layer by the schema, with all other columns.
+    Return the attributes of a layer by the schema, without ``_1`` or ``_2``, then all others.
 
-    Parameters
-    ----------
-    attributes : DataFrame
-        Columns of the layer; the index is the number of the feature.
-    names : mapping of str to str
-        Name in the schema, without ``_1`` or ``_2`` -> the layer's column, for columns that are
-        not recognised or not the right ones.
-    file : str
-        The file, for messages.
-
-    Returns
-    -------
-    table : DataFrame
-        One row per building: columns of the schema without ``_1`` or ``_2``, then all others;
-        ``cell_notes`` contains what was not understood.
+    The index is the number of the feature; ``cell_notes`` contains what was not understood. Names
+    of the schema -> the layer's columns are given where those are not recognised, or not the right
+    ones.
 
     Raises
     ------
@@ -101,15 +89,8 @@ def schema_columns(
     """
     Return the columns of a known source under the schema's names, then those to carry along.
 
-    Parameters
-    ----------
-    attributes : DataFrame
-        One row per footprint with the layer's columns; the index is the number of the feature.
-    file : str
-        The file, for messages.
-    given : mapping of str to Series, optional
-        Name in the schema -> column that the user names for it, which takes the place of the
-        recognised one.
+    The index is the number of the feature. A column that the user names for a name of the schema
+    takes the place of the recognised one.
 
     Raises
     ------
@@ -211,20 +192,9 @@ def with_class_heights(
     """
     Return a table of buildings with missing heights or storeys estimated by class.
 
-    Parameters
-    ----------
-    table : DataFrame
-        With ``height``, ``storeys`` or ``period``.
-    classes : Series
-        Class of each building; missing classes form a separate class.
-    is_understood : (n,) ndarray of bool, optional
-        Whether every size of the row was understood; others are not estimated.
-
-    Returns
-    -------
-    table : DataFrame
-        Estimated rows have ``height_log_std``, the logarithmic standard deviation of the class, at
-        least 1e-3, by which the row is marked as derived.
+    Missing classes form a separate class; rows with a size that was not understood are not
+    estimated. Estimated ones have ``height_log_std``, the logarithmic standard deviation of the
+    class, at least 1e-3, by which the row is marked as derived.
     """
     missing = _has_no_size(table) & is_understood
     if not missing.any():

@@ -44,14 +44,7 @@ _FLAT = 1e-6
 
 def read_citygml(file: Path, source: str) -> RawLayer:
     """
-    Read the buildings of a city model.
-
-    Parameters
-    ----------
-    file : Path
-        CityGML 1.0 or 2.0.
-    source : str
-        Name of the file, for messages.
+    Read the buildings of a city model; messages name its source.
 
     Raises
     ------
@@ -86,15 +79,16 @@ def _buildings(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
     """Yield the buildings of a document, and add the names of its reference systems."""
     # No entity, no address, no unlimited text
     safe = {"resolve_entities": False, "load_dtd": False, "no_network": True, "huge_tree": False}
-    tags = (*_BUILDINGS, _VERSION_3, "{*}Envelope")
+    tags, events = (*_BUILDINGS, _VERSION_3, "{*}Envelope"), ("start", "end")
     with file.open("rb") as opened:
-        for _, element in etree.iterparse(opened, tag=tags, **safe):
+        for event, element in etree.iterparse(opened, events=events, tag=tags, **safe):
             if element.getroottree().docinfo.internalDTD is not None:
                 raise CatalogError(source, "a document type definition is not allowed")
             if element.tag == _VERSION_3:
                 raise CatalogError(source, "CityGML 3.0 is not read, 1.0 and 2.0 are")
-            systems.extend(filter(None, [element.get("srsName")]))
-            if element.tag in _BUILDINGS:
+            if event == "start":
+                systems.extend(filter(None, [element.get("srsName")]))
+            elif element.tag in _BUILDINGS:
                 yield element
                 # Free the memory of the building and of all elements before it
                 element.clear()

@@ -57,14 +57,7 @@ LONGEST_OUTLINE = 1 << 20
 
 def read_csv_buildings(file: Path, source: str) -> RawLayer:
     """
-    Read a table of buildings.
-
-    Parameters
-    ----------
-    file : Path
-        CSV.
-    source : str
-        Name of the file, for messages.
+    Read a table of buildings; messages name its source.
 
     Raises
     ------

@@ -24,7 +24,7 @@ LONGEST_LINE, MOST_LINES = 1 << 20, 5_000_000
 LARGEST_ASSETS = 512 << 20
 
 #: Geometries that are parsed together.
-_BLOCK = 20_000
+_BLOCK = 1_000
 
 _GENERAL = "GeneralInformation"
 
@@ -44,12 +44,7 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
     """
     Read a file of features, one per line; blank lines and record separators are skipped.
 
-    Parameters
-    ----------
-    file : Path
-        UTF-8. A line that is no feature is a separate fault.
-    source : str
-        Name of the file, for messages.
+    A line that is no feature is a separate fault.
 
     Raises
     ------
@@ -76,10 +71,10 @@ def _layer(found: Iterator[_Feature]) -> RawLayer:
             # A number beyond all numbers becomes infinite, which no place on the Earth is
             with np.errstate(all="ignore"):
                 shapes.append(shapely.from_geojson(texts, on_invalid="ignore"))
-            for row, (text, plain, fault) in enumerate(block):
-                if fault or (text is not None and shapes[-1][row] is None):
-                    faults[first + row] = fault or "not a geometry of GeoJSON"
-                yield plain
+            for row in np.flatnonzero(shapely.is_missing(shapes[-1])).tolist():
+                if block[row].fault or block[row].geometry is not None:
+                    faults[first + row] = block[row].fault or "not a geometry of GeoJSON"
+            yield from (feature.cells for feature in block)
             first += len(block)
 
     table = cell_table(cells())
@@ -92,25 +87,24 @@ def _features_of_lines(file: Path, source: str) -> Iterator[_Feature]:
         if row >= MOST_LINES:
             raise CatalogError(source, f"it has more than {MOST_LINES} features: split the file")
         # The fault of a line is that of its building
-        geometry, fault, cells = None, "", {}
-        try:
-            feature = {} if len(line) > LONGEST_LINE else json.loads(line)
-        except (ValueError, RecursionError) as error:
-            fault = f"not JSON: {str(error)[:80]}"
+        fault = ""
+        if len(line) > LONGEST_LINE:
+            fault = f"the line is longer than {LONGEST_LINE} bytes"
         else:
-            if len(line) > LONGEST_LINE:
-                fault = f"the line is longer than {LONGEST_LINE} bytes"
-            # One feature, not a collection of them
-            elif _member(feature, "type") != "Feature":
-                fault = "not a GeoJSON feature"
-            else:
-                geometry, cells = feature.get("geometry"), _member(feature, "properties")
-        plain = cells if isinstance(cells, dict) else {}
-        yield _Feature(
-            None if geometry is None else json.dumps(geometry),
-            {name: plain_cell(value) for name, value in plain.items()},
-            fault,
-        )
+            try:
+                feature = json.loads(line)
+            except (ValueError, RecursionError) as error:
+                fault = f"not JSON: {str(error)[:80]}"
+        # One feature, not a collection of them
+        if not fault and not (isinstance(feature, dict) and feature.get("type") == "Feature"):
+            fault = "not a GeoJSON feature"
+        if fault:
+            yield _Feature(None, {}, fault)
+            continue
+        geometry, properties = feature.get("geometry"), feature.get("properties")
+        cells = properties if isinstance(properties, dict) else {}
+        plain = {name: plain_cell(value) for name, value in cells.items()}
+        yield _Feature(None if geometry is None else json.dumps(geometry), plain)
 
 
 def _lines(file: Path) -> Iterator[bytes]:
@@ -148,13 +142,6 @@ def is_asset_json(head: bytes) -> bool:
 def read_asset_json(file: Path, source: str) -> RawLayer:
     """
     Read assets: one, a list of them, or a FeatureCollection.
-
-    Parameters
-    ----------
-    file : Path
-        Its size is limited to ``LARGEST_ASSETS``.
-    source : str
-        Name of the file, for messages.
 
     Raises
     ------

@@ -303,10 +303,10 @@ def _remove(package: sqlite3.Connection, foreign: set[str]) -> None:
 
 def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> str:
     """Return the requested one of the layers and their geometries, or the only one with them."""
-    kinds = dict(layers.tolist())
+    kinds: dict[str, str | None] = dict(layers.tolist())
     names = ", ".join(kinds) or "none"
     # A layer without geometries is a table
-    spatial = [layer] if layer in kinds else [name for name, kind in kinds.items() if kind]
+    spatial = [name for name, kind in kinds.items() if name == layer or (kind and not layer)]
     # A view may be what the user means
     if layer in views or (views and layer is None and not spatial):
         view = layer or ", ".join(sorted(views))
@@ -318,7 +318,7 @@ def _layer_name(file: Path, layers: Any, layer: str | None, views: set[str]) -> 
     elif len(spatial) > 1:
         problem = f"several layers, name one: {', '.join(spatial)}"
     else:
-        return str(spatial[0])
+        return spatial[0]
     raise CatalogError(str(file), problem)
 
 

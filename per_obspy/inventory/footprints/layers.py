@@ -30,23 +30,15 @@ _POINTS = {shapely.GeometryType.POINT, shapely.GeometryType.MULTIPOINT}
 
 
 class Layer(NamedTuple):
-    """
-    Footprints of one layer.
+    """Footprints of one layer."""
 
-    Attributes
-    ----------
-    outlines : pa.Array
-        WKB of ``n_buildings`` valid polygons and multipolygons, two-dimensional, longitude and
-        latitude in degrees (WGS 84); longitudes of one across 180 degrees go on beyond it.
-    attributes : DataFrame
-        One row per outline; its index is the number of the feature in the file, from 1, or the line
-        of a table.
-    rejected : tuple of Rejection
-        Features whose geometry cannot be used.
-    """
-
+    #: WKB of valid polygons and multipolygons, two-dimensional, longitude and latitude in degrees
+    #: (WGS 84); longitudes of one across 180 degrees go on beyond it.
     outlines: pa.Array
+    #: One row per outline; the index is the number of the feature in the file, from 1, or the line
+    #: of a table.
     attributes: pd.DataFrame
+    #: Features whose geometry cannot be used.
     rejected: tuple[Rejection, ...]
 
 

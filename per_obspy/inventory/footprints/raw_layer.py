@@ -17,30 +17,19 @@ MOST_NAMES = 200
 
 
 class RawLayer(NamedTuple):
-    """
-    A layer as its file has it.
+    """A layer as its file has it."""
 
-    Attributes
-    ----------
-    wkb : pa.Array or pa.ChunkedArray
-        Geometries as WKB, first coordinate east, second north; null where there is none.
-    attributes : pa.Table
-        One row per geometry.
-    crs : object
-        Coordinate reference system in any form; None if unknown.
-    numbers : (n,) ndarray of int
-        Number of each feature in the file, or line of a table.
-    faults : mapping of int to str
-        Position of a feature -> why it has no geometry, where that is known.
-    broken : tuple of Rejection
-        Lines of a table that are no rows.
-    """
-
+    #: Geometries as WKB, first coordinate east, second north; null where there is none.
     wkb: pa.Array | pa.ChunkedArray
+    #: One row per geometry.
     attributes: pa.Table
+    #: Coordinate reference system in any form; None if unknown.
     crs: Any
+    #: Number of each feature in the file, or line of a table.
     numbers: NDArray[np.int64]
+    #: Position of a feature -> why it has no geometry, where that is known.
     faults: Mapping[int, str] = {}
+    #: Lines of a table that are no rows.
     broken: tuple[Rejection, ...] = ()
 
 

@@ -20,27 +20,7 @@ from per_obspy.inventory.footprints.json_buildings import LENGTH_UNIT
 
 
 class Source(NamedTuple):
-    """
-    Names and codes of one source.
-
-    Attributes
-    ----------
-    name : str
-        The source.
-    needs : sequence of sequence of str
-        Sets of columns. A layer with all columns of one set is of this source.
-    columns : mapping of str to str
-        Name of a building's quantity in the schema -> the source's column, which may be absent.
-    carried : sequence of str
-        Columns to carry along unchanged.
-    class_column : str or None
-        Column of use or type, by which missing heights are estimated; empty if all buildings of a
-        layer are one class, None if heights are not estimated.
-    codes : sequence of str
-        Columns of material and lateral system; empty if the source has none.
-    systems : mapping of str to str
-        Code, material and lateral system joined by a blank -> structural system of the schema.
-    """
+    """Names and codes of one source, as ``sources.toml`` explains them."""
 
     name: str
     needs: list[list[str]]
@@ -48,6 +28,7 @@ class Source(NamedTuple):
     carried: tuple[str, ...] = ()
     class_column: str | None = None
     codes: tuple[str, ...] = ()
+    #: Code -> structural system of the schema.
     systems: Mapping[str, str] = {}
 
 
@@ -185,26 +166,11 @@ def taxonomy(text: str, systems: Mapping[str, str]) -> tuple[float, float, str, 
     Return the attributes of a string of the GEM Building Taxonomy.
 
     Attributes are separated by ``/``, details of one by ``+``. Those of version 2 are in a fixed
-    order, those of version 3 are not, so that each is known by its code.
+    order, those of version 3 are not, so that each is known by its code; others are unknown.
 
-    Parameters
-    ----------
-    text : str
-        The string; attributes that are not understood are unknown.
-    systems : mapping of str to str
-        Codes -> structural system.
-
-    Returns
-    -------
-    storeys : float
-        Above ground, NaN if unknown; the geometric mean of the ends of a range.
-    log_std : float
-        Logarithmic standard deviation of the storeys, NaN if they are exact or unknown; that of an
-        even distribution in a range.
-    code : str
-        Material, or material and lateral system, as ``systems`` has it; empty if unknown.
-    adjoining : int or None
-        Buildings that adjoin it.
+    Returned are the storeys above ground (the geometric mean of the ends of a range) and their
+    logarithmic standard deviation (that of an even distribution in a range), NaN where unknown;
+    the code as ``systems`` has it, empty if unknown; the number of adjoining buildings, or None.
 
     Examples
     --------

@@ -98,7 +98,7 @@ def write_search(found: "FootprintPairs", path: Path) -> "Search":
         Account of neighbours and of those that are left out, which a Parquet table holds too.
     """
     from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.buildings import write_buildings
+    from per_obspy.inventory.footprints.footprint_pairs import write_buildings
     from per_obspy.pipeline.losses import cell_names
     from per_obspy.tables.coverage import as_metadata, search_account
     from per_obspy.tables.table_files import write_rejected

@@ -119,26 +119,9 @@ def test_unknown_systems_stay_empty():
     assert schema_columns(pd.DataFrame(survey), "town.gpkg")["system"].tolist() == ["", ""]
 
 
-def test_openstreetmap():
-    table = schema_columns(
-        pd.DataFrame({"osm_id": [12, 13], "building:levels": ["3", None], "building": ["yes"] * 2}),
-        "a",
-    )
-    assert table["building_id"].tolist() == ["12", "13"]
-    assert table["storeys"].tolist()[0] == 3.0
-
-
 def test_our_own_names_with_a_system():
     table = schema_columns(pd.DataFrame({"height": [3.0, 4.0], "system": ["other", None]}), "a")
     assert table["system"].tolist() == ["other", ""]
-
-
-def test_nothing_that_tells_a_height():
-    with pytest.raises(
-        CatalogError,
-        match=r"town.gpkg: no column height, storeys or period .*columns found: colour",
-    ):
-        schema_columns(pd.DataFrame({"colour": ["red"]}), "town.gpkg")
 
 
 def _town(count=400, seed=3):

@@ -12,10 +12,12 @@ import shapely
 
 from per_obspy import pairs_from_footprints
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints import buildings as module
 from per_obspy.inventory.footprints import footprint_pairs
-from per_obspy.inventory.footprints.buildings import without_repetitions, write_buildings
-from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+from per_obspy.inventory.footprints.footprint_pairs import (
+    find_footprint_pairs,
+    without_repetitions,
+    write_buildings,
+)
 from per_obspy.inventory.footprints.layers import polygons, read_layer
 
 HOUSES = [shapely.box(0.3 + 1e-4 * i, 0.0, 0.3 + 1e-4 * (i + 1), 1e-4) for i in range(6)]
@@ -67,7 +69,7 @@ def test_the_file_of_buildings_is_a_layer_that_gives_the_same_pairs(town, tmp_pa
 def test_blocks_do_not_change_the_pairs(town, monkeypatch):
     whole = pairs_from_footprints(town)
     monkeypatch.setattr(footprint_pairs, "CHUNK", 2)
-    monkeypatch.setattr(module, "BLOCK", 2)
+    monkeypatch.setattr(footprint_pairs, "BLOCK", 2)
     pd.testing.assert_frame_equal(pairs_from_footprints(town), whole)
     assert whole["position_1"].tolist() == ["end", "inside", "inside", "inside", "inside"]
     assert whole["position_2"].tolist() == ["inside", "inside", "inside", "inside", "end"]
@@ -75,7 +77,7 @@ def test_blocks_do_not_change_the_pairs(town, monkeypatch):
 
 def test_repetitions_far_apart_are_found_whatever_the_first_point(monkeypatch):
     # would catch repetitions within a block only, and bytes instead of shapes
-    monkeypatch.setattr(module, "BLOCK", 2)
+    monkeypatch.setattr(footprint_pairs, "BLOCK", 2)
     turned = shapely.Polygon(np.roll(shapely.get_coordinates(HOUSES[0])[:-1], 1, axis=0))
     wkb = pa.array(shapely.to_wkb([*HOUSES[:5], turned]), pa.large_binary())
     table = pd.DataFrame({"building_id": list("abcdea")}, index=range(1, 7))

@@ -1,10 +1,6 @@
 """Pairs from footprint files: every format, faults of features, real and synthetic cities."""
 
-import json
-
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
 import pyogrio
 import pyproj
 import pytest
@@ -70,19 +66,6 @@ def write(tmp_path):
     return write
 
 
-def _write_geoparquet(path, polygons, **column):
-    described = {"primary_column": "shape", "columns": {"shape": {"encoding": "WKB"} | column}}
-    table = pa.table(
-        {
-            "height": HEIGHTS,
-            "storeys": STOREYS,
-            "shape": shapely.to_wkb(_degrees(polygons)).tolist(),
-        }
-    )
-    pa.parquet.write_table(table.replace_schema_metadata({"geo": json.dumps(described)}), path)
-    return path
-
-
 def _check_row(pairs):
     assert pairs.attrs["rejected"] == ()
     assert pairs["pair_id"].tolist() == ["feature 1/feature 2", "feature 2/feature 3"]
@@ -100,10 +83,6 @@ def _check_row(pairs):
 @pytest.mark.parametrize("name", ["town.gpkg", "town.geojson", "town.shp", "town.fgb"])
 def test_every_format_gives_the_same_row(write, name):
     _check_row(pairs_from_footprints(write(ROW, name)).sort_values("pair_id", ignore_index=True))
-
-
-def test_geoparquet_gives_the_same_row(tmp_path):
-    _check_row(pairs_from_footprints(_write_geoparquet(tmp_path / "town.parquet", ROW)))
 
 
 def test_other_coordinates_give_the_same_row(write):

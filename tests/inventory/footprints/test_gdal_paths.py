@@ -1,7 +1,5 @@
 """Paths that GDAL takes literally: written and read, and never fetched."""
 
-import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +7,6 @@ import pyogrio
 import pytest
 import shapely
 
-from per_obspy.errors import CatalogError
 from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.inventory.footprints.layers import read_layer
 
@@ -52,33 +49,3 @@ def test_files_of_any_name_with_those_that_belong_to_them(tmp_path, name):
     for path in list(tmp_path.iterdir()):
         path.rename(path.with_name(f"{name}{path.suffix}"))
     assert read_layer(tmp_path / f"{name}.shp").attributes["height"].tolist() == [9.0]
-
-
-@pytest.fixture
-def service():
-    """Address of a service, and the paths that it was asked for."""
-    asked = []
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self):
-            asked.append(self.path)
-            self.send_error(404)
-
-        do_HEAD = do_GET
-
-        def log_message(self, *_):
-            pass
-
-    server = HTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}", asked
-    server.shutdown()
-    server.server_close()
-
-
-@pytest.mark.parametrize("form", ["{}/x.gpkg", "/vsicurl/{}/x.gpkg", "/vsizip//vsicurl/{}/x.gpkg"])
-def test_an_address_is_no_file_and_is_not_fetched(service, form):
-    address, asked = service
-    with pytest.raises(CatalogError, match="no such file"):
-        read_layer(form.format(address))
-    assert asked == []

@@ -128,6 +128,14 @@ def test_links_of_geojson_are_not_followed(town, service, key, place):
     assert asked == []
 
 
+@pytest.mark.parametrize("form", ["{}/x.gpkg", "/vsicurl/{}/x.gpkg", "/vsizip//vsicurl/{}/x.gpkg"])
+def test_an_address_is_no_file_and_is_not_fetched(service, form):
+    address, asked = service
+    with pytest.raises(CatalogError, match="no such file"):
+        read_layer(form.format(f"http://{address}"))
+    assert asked == []
+
+
 def test_parts_of_a_shapefile_are_not_elsewhere(town, tmp_path, service):
     address, asked = service
     path = town("town.shp")

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-import shapely
 from building_samples import (
     brails_geojson,
     geometries,
@@ -56,23 +55,6 @@ def test_a_broken_line_loses_its_own_building(tmp_path, line, reason):
     rejected = [row for row in pairs.attrs["rejected"] if row.kind == "building"]
     assert [row.row for row in rejected] == [2]
     assert any(word in rejected[0].reasons[0] for word in reason.split("|")), rejected
-
-
-def test_coordinates_in_metres_are_outside_of_degrees(tmp_path):
-    town = small_town()
-    outlines = shapely.transform(town.outlines, lambda xy: xy * 1e5)
-    with pytest.raises(CatalogError, match=r"0 usable footprints.*lie outside"):
-        pairs_from_footprints(microsoft(tmp_path, town._replace(outlines=outlines)))
-
-
-def test_a_height_of_minus_one_is_unknown(tmp_path):
-    town = small_town()
-    path = microsoft(tmp_path, town._replace(heights=[12.0, -1.0, 6.0, 9.0]))
-    pairs = pairs_from_footprints(path)
-    # too few buildings for an estimate: both pairs of the second building are rejected
-    assert pairs.empty
-    reasons = {reason for row in pairs.attrs["rejected"] for reason in row.reasons}
-    assert any("one is needed" in reason for reason in reasons)
 
 
 def test_what_is_refused_as_a_whole(tmp_path, monkeypatch):

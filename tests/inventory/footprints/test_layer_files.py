@@ -10,7 +10,6 @@ import pytest
 import shapely
 from building_samples import (
     geometries,
-    google,
     microsoft_packed,
     osm_xml,
     overture,
@@ -25,13 +24,6 @@ from per_obspy.inventory.footprints.layer_files import read_raw_layer
 from per_obspy.inventory.footprints.sources import source_of, tags_of
 
 REAL = Path(pyogrio.__file__).parent / "tests" / "fixtures" / "sample.osm.pbf"
-
-
-def test_packed_csv_of_google(tmp_path):
-    path = google(tmp_path, small_town())
-    packed = tmp_path / "0c5_buildings.csv.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes()))
-    assert len(pairs_from_footprints(packed)) == 2
 
 
 def test_a_bomb_is_refused_before_it_fills_the_disk(tmp_path, monkeypatch):
@@ -95,24 +87,10 @@ def test_damaged_files_end_in_one_line(tmp_path, name, content):
     assert "\n" not in str(error.value)
 
 
-def test_a_cut_extract(tmp_path):
-    path = tmp_path / "a.osm.pbf"
-    path.write_bytes(REAL.read_bytes()[:4000])
-    with pytest.raises(CatalogError):
-        pairs_from_footprints(path)
-
-
 def test_tags_in_hstore_and_hostile_text():
     assert tags_of(r'"name"=>"The \"Old\" House","height"=>"9"')["height"] == "9"
     assert tags_of("{" * 100_000) == {}
     assert tags_of('"' * 100_000) == {}
-
-
-@pytest.mark.parametrize(("text", "expected"), [("10", 10.0), ("9.5 m", 9.5), ("40 ft", 12.192)])
-def test_heights_with_units(tmp_path, text, expected):
-    path = osm_xml(tmp_path, small_town())
-    path.write_text(path.read_text().replace('v="12.0"', f'v="{text}"'))
-    assert pairs_from_footprints(path)["height_1"].tolist()[0] == pytest.approx(expected)
 
 
 def test_a_height_that_is_none_leaves_the_storeys_to_decide(tmp_path):

@@ -223,6 +223,13 @@ def test_a_column_that_stands_twice(tmp_path):
     pa.parquet.write_table(table.append_column("height", table["height"]), path)
     with pytest.raises(CatalogError, match=r"Multiple matches for .*height"):
         read_layer(path)
+    # FlatGeobuf may repeat a name as well
+    path, columns = tmp_path / "town.fgb", [np.array(HEIGHTS)] * 2
+    wkb, kind = shapely.to_wkb(np.array(HOUSES)), "Polygon"
+    names = ["height", "height"]
+    pyogrio.raw.write(path, wkb, columns, names, geometry_type=kind, crs="EPSG:4326")
+    with pytest.raises(CatalogError, match=r"town\.fgb: column height occurs more than once"):
+        read_layer(path)
 
 
 @pytest.mark.parametrize("prj", ["junk", "", "GEOGCS[", 'LOCAL_CS["site"]'])
