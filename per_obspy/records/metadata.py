@@ -298,17 +298,17 @@ def _stations(trace: Trace, inventory: Inventory | None) -> list[Station]:
     """Return the descriptions of a trace's station that are valid at its start, tables too."""
     stats = trace.stats
     networks = [network for network in inventory or () if network.code == stats.network]
-    stations = [station for network in networks for station in network]
-    here = [station for station in stations if station.code == stats.station]
-    return [station for station in here if station.is_active(stats.starttime)]
+    stations = (station for network in networks for station in network)
+    active = (station for station in stations if station.is_active(stats.starttime))
+    return [station for station in active if station.code == stats.station]
 
 
 def _channel(trace: Trace, stations: Sequence[Station]) -> Channel | None:
     """Return the channel of a trace at its start, or None."""
     stats = trace.stats
     codes = (stats.channel, stats.location)
-    channels = [channel for station in stations for channel in station]
-    same = [channel for channel in channels if (channel.code, channel.location_code) == codes]
+    channels = (channel for station in stations for channel in station)
+    same = (one for one in channels if (one.code, one.location_code) == codes)
     return _only(trace, "channel", [one for one in same if one.is_active(stats.starttime)])
 
 

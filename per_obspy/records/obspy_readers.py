@@ -108,19 +108,40 @@ def read_content(reader: Callable[..., Any], content: bytes, path: Path, **optio
     Parameters and errors are those of :func:`read_with_obspy`; gzip or bzip2 may have packed the
     content.
     """
-    return _read(reader, _unpacked(content, path), path, options)
+    return read_bytes_with_obspy(reader, _unpacked(content, path), path, **options)
 
 
 def read_bytes_with_obspy(
-    reader: Callable[..., Any], content: bytes, name: str, **options: Any
+    reader: Callable[..., Any], content: bytes, source: Path | str, **options: Any
 ) -> Any:
     """
     Call a reader of ObsPy on the answer of a service, or on a part of a file.
 
-    Parameters and errors are those of :func:`read_with_obspy`; the name is that of the source of
-    the content, for messages.
+    Parameters and errors are those of :func:`read_with_obspy`; the source of the content is named
+    in messages. Errors of ObsPy's bare Exception, or of any library below, reject.
     """
-    return _read(reader, content, name, options)
+    kind = _KINDS[reader.__name__]
+    beside = isinstance(source, Path) and source.is_file()
+    try:
+        name = options.pop("format", None) or _format(kind, content)
+        # Samples in a second file are found by the path of the first only
+        name = name or (_detected(kind, str(source), _TWO_FILES) if beside else None)
+        if name not in FORMATS[kind]:
+            raise RecordRejected(str(source), _unknown(content))
+        # Faults that ObsPy would not notice, or not survive
+        if name in _CHECKS:
+            _CHECKS[name](content, str(source))
+        options |= {"format": name, "check_compression": False}
+        if name in _HERE:
+            return reader(_named(content, str(source)), **options)
+        place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
+        return _value_apart(reader.__name__, content, place, options)
+    except BeyondLimits as error:
+        raise RecordRejected(str(source), f"{error}: damaged, or no {name} file") from error
+    except PerError:
+        raise
+    except Exception as error:
+        raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
 
 
 def _unpacked(content: bytes, path: Path) -> bytes:
@@ -144,34 +165,6 @@ def _unpacked(content: bytes, path: Path) -> bytes:
     except (OSError, EOFError, zlib.error) as error:
         raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
     return whole.getvalue()
-
-
-def _read(
-    reader: Callable[..., Any], content: bytes, source: Path | str, options: dict[str, Any]
-) -> Any:
-    """Call a reader; its errors, of ObsPy's bare Exception or of any library below, reject."""
-    kind = _KINDS[reader.__name__]
-    beside = isinstance(source, Path) and source.is_file()
-    try:
-        name = options.pop("format", None) or _format(kind, content)
-        # Samples in a second file are found by the path of the first only
-        name = name or (_detected(kind, str(source), _TWO_FILES) if beside else None)
-        if name not in FORMATS[kind]:
-            raise RecordRejected(str(source), _unknown(content))
-        # Faults that ObsPy would not notice, or not survive
-        if name in _CHECKS:
-            _CHECKS[name](content, str(source))
-        options |= {"format": name, "check_compression": False}
-        if name in _HERE:
-            return reader(_named(content, str(source)), **options)
-        place = glob.escape(str(source)) if name in _TWO_FILES and beside else None
-        return _value_apart(reader.__name__, content, place, options)
-    except BeyondLimits as error:
-        raise RecordRejected(str(source), f"{error}: damaged, or no {name} file") from error
-    except PerError:
-        raise
-    except Exception as error:
-        raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
 
 
 def _named(content: bytes, name: str) -> BytesIO:

@@ -2,8 +2,8 @@
 
 import re
 import zlib
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -67,7 +67,8 @@ _MEANINGS = ("pseudo-spectral acceleration at 5 % damping", "log-standard deviat
 class _Grid(NamedTuple):
     """A grid file."""
 
-    attributes: dict[str, str]  # path, and event and version of the map
+    path: Path
+    attributes: dict[str, str]  # event and version of the map, and its path
     units: dict[str, str]  # of each field
     shape: tuple[int, int]  # latitudes and longitudes
     table: pd.DataFrame  # fields in the unit of the file, by latitude and longitude, degrees
@@ -99,10 +100,9 @@ def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
         If a file cannot be read, is no grid, lacks a field, has another unit, number of rows or
         shape than its header has, or a value that is missing or implausible.
     """
-    grid = _read(path)
+    grid = _read(path, *REQUIRED)
     # By period: PSA03 is 0.3 s
     names = sorted(name for name in grid.units if re.fullmatch(r"PSA\d\d", name))
-    _require_fields(grid, *REQUIRED)
     variables = {"psa": _variable(grid, names, _ACCELERATION, _MEANINGS[0])}
     # The deviation, from a separate file or from the grid
     deviations = [f"STD{name}" for name in names]
@@ -155,8 +155,10 @@ def map_event(path: Path) -> dict[str, object]:
 def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
     """Return the attributes of the elements that begin in the head of a grid."""
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start",))
+    with _faults_of(path):
+        text = _text(path)[:_HEAD]
     try:
-        parser.feed(_text(path)[:_HEAD])
+        parser.feed(text)
         # The head ends within the grid, so that the document stays open
         events = cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events())
         return {_name(element): element.attrib for _, element in events}
@@ -164,19 +166,63 @@ def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
         return {}
 
 
+@contextmanager
+def _faults_of(path: Path) -> Iterator[None]:
+    """Name the file of a fault."""
+    try:
+        yield
+    except ValueError as error:
+        raise CatalogError(str(path), str(error)) from error
+
+
 def _variable(grid: _Grid, names: str | list[str], kind: _Kind, meaning: str) -> Any:
     """Return a field in SI as a variable of a Dataset, or the fields of all periods."""
     attributes = {"units": kind.unit, "long_name": meaning}
-    if isinstance(names, str):
-        return _AXES, _values(grid, names, kind), attributes
-    return ("period", *_AXES), np.stack([_values(grid, name, kind) for name in names]), attributes
+    with _faults_of(grid.path):
+        if isinstance(names, str):
+            return _AXES, _values(grid, names, kind), attributes
+        values = [_values(grid, name, kind) for name in names]
+    return ("period", *_AXES), np.stack(values), attributes
 
 
-def _require_fields(grid: _Grid, *names: str) -> None:
+def _require_fields(units: Mapping[str, str], *names: str) -> None:
     """Refuse a map without some fields."""
-    if missing := ", ".join(name for name in names if name not in grid.units):
-        problem = f"has no field {missing}, only {', '.join(grid.units)}"
-        raise CatalogError(grid.attributes["source"], problem)
+    if missing := ", ".join(name for name in names if name not in units):
+        raise ValueError(f"has no field {missing}, only {', '.join(units)}")
+
+
+def _values(grid: _Grid, name: str, kind: _Kind) -> FloatArray:
+    """Return a field in SI; its unit must be one of its kind, all its values plausible."""
+    _require_fields(grid.units, name)
+    unit, values = grid.units[name], grid.table[name]
+    # Versions of maps differ in the spelling of units
+    if unit not in kind.units:
+        raise ValueError(f"{name} is in {unit!r}, not in one of {', '.join(kind.units)}")
+    # No number, negative or implausibly large: the first of them with its place
+    bad = ~values.between(0.0, kind.largest)
+    if bad.any():
+        first = int(np.argmax(bad))
+        latitude, longitude = grid.table.index[first]
+        place = f"longitude {longitude:g}, latitude {latitude:g}"
+        raise ValueError(f"{name} = {values.iloc[first]:g} {unit} at {place}")
+    return values.to_numpy().reshape(grid.shape) * kind.units[unit]
+
+
+def _read(path: Path, *required: str) -> _Grid:
+    """Read a grid file."""
+    with _faults_of(path):
+        root = _root(path)
+        units, size = _units(root), _size(root)
+        table = pd.DataFrame(_rows(root, len(units), size), columns=[*units])
+        # Every row has its node's coordinates
+        _require_fields(units, "LON", "LAT")
+        _require_fields(units, *required)
+        nodes = _nodes(table, size)
+    version = {name: root.attrib[name] for name in _VERSION if name in root.attrib}
+    # Rows from south to north, in each from west to east
+    return _Grid(
+        path, {"source": str(path), **version}, units, size, table.set_index(nodes).sort_index()
+    )
 
 
 def _read_at_nodes(path: Path, grid: _Grid) -> _Grid:
@@ -184,55 +230,23 @@ def _read_at_nodes(path: Path, grid: _Grid) -> _Grid:
     other = _read(path)
     for name in reversed(_AXES):
         if not other.table.index.unique(name).equals(grid.table.index.unique(name)):
-            source = grid.attributes["source"]
-            raise CatalogError(str(path), f"its {name}s are not those of {source}")
+            raise CatalogError(str(path), f"its {name}s are not those of {grid.path}")
     return other
 
 
-def _values(grid: _Grid, name: str, kind: _Kind) -> FloatArray:
-    """Return a field in SI; its unit must be one of its kind, all its values plausible."""
-    _require_fields(grid, name)
-    source, unit, values = grid.attributes["source"], grid.units[name], grid.table[name]
-    # Versions of maps differ in the spelling of units
-    if unit not in kind.units:
-        problem = f"{name} is in {unit!r}, not in one of {', '.join(kind.units)}"
-        raise CatalogError(source, problem)
-    # No number, negative or implausibly large: the first of them with its place
-    bad = ~values.between(0.0, kind.largest)
-    if bad.any():
-        first = int(np.argmax(bad))
-        latitude, longitude = grid.table.index[first]
-        place = f"longitude {longitude:g}, latitude {latitude:g}"
-        raise CatalogError(source, f"{name} = {values.iloc[first]:g} {unit} at {place}")
-    return values.to_numpy().reshape(grid.shape) * kind.units[unit]
-
-
-def _read(path: Path) -> _Grid:
-    """Read a grid file."""
-    source, root = str(path), _root(path)
-    units, size = _units(source, root), _size(source, root)
-    table = pd.DataFrame(_rows(source, root, len(units), size), columns=[*units])
-    # Every row has its node's coordinates
-    attributes = {name: root.attrib[name] for name in _VERSION if name in root.attrib}
-    grid = _Grid({"source": source, **attributes}, units, size, table)
-    _require_fields(grid, "LON", "LAT")
-    # Rows from south to north, in each from west to east
-    return grid._replace(table=table.set_index(_nodes(source, table, size)).sort_index())
-
-
-def _nodes(source: str, table: pd.DataFrame, size: tuple[int, int]) -> pd.MultiIndex:
+def _nodes(table: pd.DataFrame, size: tuple[int, int]) -> pd.MultiIndex:
     """Return latitude and longitude of every row, which form a grid, degrees."""
     table["LON"] = _unbroken(table["LON"].to_numpy())
     for name, limit in (("LON", 540.0), ("LAT", 90.0)):
         wrong = table[name][~table[name].between(-limit, limit)]
         if not wrong.empty:
-            problem = f"{name} = {wrong.iloc[0]:g} is not between {-limit:g} and {limit:g}"
-            raise CatalogError(source, problem)
+            limits = f"between {-limit:g} and {limit:g}"
+            raise ValueError(f"{name} = {wrong.iloc[0]:g} is not {limits}")
     nodes = pd.MultiIndex.from_frame(table[["LAT", "LON"]], names=_AXES)
     east = nodes.levels[1]
     # A whole turn would repeat a meridian
     if nodes.has_duplicates or nodes.levshape != size or east[-1] - east[0] >= 360.0:
-        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
+        raise ValueError("its nodes do not form a grid of longitudes and latitudes")
     return nodes
 
 
@@ -241,10 +255,9 @@ def _root(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.fromstring(_text(path))
     except ElementTree.ParseError as error:
-        raise CatalogError(str(path), f"cannot be read as XML: {error}") from error
+        raise ValueError(f"cannot be read as XML: {error}") from error
     if (name := _name(root)) != "shakemap_grid":
-        problem = f"is no ShakeMap grid: its root is {name}, not shakemap_grid"
-        raise CatalogError(str(path), problem)
+        raise ValueError(f"is no ShakeMap grid: its root is {name}, not shakemap_grid")
     return root
 
 
@@ -253,7 +266,7 @@ def _text(path: Path) -> str:
 
     def check(total: int) -> None:
         if total > LARGEST_FILE:
-            raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
+            raise ValueError(f"has more than {LARGEST_FILE} bytes")
 
     try:
         with path.open("rb") as file:
@@ -261,11 +274,10 @@ def _text(path: Path) -> str:
             file.seek(0)
             text = b"".join(unpacked(file, head, check)).decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+        raise ValueError(f"cannot be read: {reason_of(error)}") from error
     # Entities of a document type could fill the memory
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        problem = "contains a document type (DOCTYPE), which no ShakeMap has: refused"
-        raise CatalogError(str(path), problem)
+        raise ValueError("contains a document type (DOCTYPE), which no ShakeMap has: refused")
     return text
 
 
@@ -274,58 +286,49 @@ def _name(element: ElementTree.Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
-def _children(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
-    """Return the elements of a name below the root."""
-    return [element for element in root if _name(element) == name]
-
-
-def _units(source: str, root: ElementTree.Element) -> dict[str, str]:
+def _units(root: ElementTree.Element) -> dict[str, str]:
     """Return the units of the fields, by name, in the order of their columns."""
-    fields = [element.attrib for element in _children(root, "grid_field")]
+    fields = [element.attrib for element in root.iterfind("{*}grid_field")]
     try:
         numbered = sorted((int(one["index"]), one["name"], one.get("units", "")) for one in fields)
     except (KeyError, ValueError) as error:
-        raise CatalogError(source, f"has a grid_field without index or name: {error}") from error
+        raise ValueError(f"has a grid_field without index or name: {error}") from error
     # Columns are known by index only: none may be missing or repeated
     units = {name: unit for _, name, unit in numbered}
     if [index for index, _, _ in numbered] != list(range(1, len(units) + 1)):
-        problem = f"its grid_fields are not numbered 1, 2, 3, ...: {', '.join(units)}"
-        raise CatalogError(source, problem)
+        raise ValueError(f"its grid_fields are not numbered 1, 2, 3, ...: {', '.join(units)}")
     return units
 
 
-def _size(source: str, root: ElementTree.Element) -> tuple[int, int]:
+def _size(root: ElementTree.Element) -> tuple[int, int]:
     """Return the numbers of latitudes and longitudes; interpolation needs two of each."""
-    specification = [element.attrib for element in _children(root, "grid_specification")]
-    numbers = specification[0] if specification else {"nlat": "0", "nlon": "0"}
+    specification = root.find("{*}grid_specification")
+    numbers = {"nlat": "0", "nlon": "0"} if specification is None else specification.attrib
     # Both must be there
     try:
         size = (int(numbers["nlat"]), int(numbers["nlon"]))
     except (KeyError, ValueError) as error:
-        problem = f"its grid_specification has no nlat and nlon: {error}"
-        raise CatalogError(source, problem) from error
+        raise ValueError(f"its grid_specification has no nlat and nlon: {error}") from error
     if min(size) < 2:
-        problem = f"needs two latitudes and two longitudes, has {size[0]} and {size[1]}"
-        raise CatalogError(source, problem)
+        raise ValueError(f"needs two latitudes and two longitudes, has {size[0]} and {size[1]}")
     return size
 
 
-def _rows(
-    source: str, root: ElementTree.Element, columns: int, size: tuple[int, int]
-) -> FloatArray:
+def _rows(root: ElementTree.Element, columns: int, size: tuple[int, int]) -> FloatArray:
     """Return the table of numbers, one row per node."""
-    text = "".join(element.text or "" for element in _children(root, "grid_data"))
+    text = "".join(element.text or "" for element in root.iterfind("{*}grid_data"))
     if not text.strip():
-        raise CatalogError(source, "has no grid_data")
+        raise ValueError("has no grid_data")
     try:
         rows = np.loadtxt(StringIO(text), dtype=np.float64, ndmin=2, comments=None)
     except ValueError as error:
-        raise CatalogError(source, f"grid_data: {error}") from error
+        raise ValueError(f"grid_data: {error}") from error
     # The header has the numbers of nodes and fields
     if rows.shape != (size[0] * size[1], columns):
         header = f"{size[0]} x {size[1]} nodes of {columns} fields"
-        table = f"grid_data has {rows.shape[0]} rows of {rows.shape[1]}"
-        raise CatalogError(source, f"{table}, its head has {header}")
+        raise ValueError(
+            f"grid_data has {rows.shape[0]} rows of {rows.shape[1]}, its head has {header}"
+        )
     return rows
 
 

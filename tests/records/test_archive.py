@@ -1,12 +1,10 @@
 """Archives of records, whole, damaged, or made to exhaust memory or time or to lead elsewhere."""
 
-import gzip
 import io
 import struct
 import tarfile
 import tracemalloc
 import zipfile
-import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -17,7 +15,7 @@ from obspy import Stream, Trace
 from per_obspy.config import Archives, Records
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.records.archive import Archive, archive_files, open_file
-from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import find_sources
 
 AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
@@ -76,18 +74,6 @@ def test_an_archive_is_a_folder(tmp_path: Path, name: str):
 
 
 @every
-def test_records_in_archives_are_the_same_as_outside(tmp_path: Path, name: str):
-    archive = pack(tmp_path / name)
-    (tmp_path / "three.AT2").write_bytes(AT2)
-    paths = [archive / "three.AT2", tmp_path / "three.AT2"]
-    for path in paths:
-        (trace,), rejected = read_station([path], None)
-        assert rejected == ()
-        assert trace.stats.source == str(path)
-        assert "coordinates" not in trace.stats  # the AT2 format has none, and none are made up
-
-
-@every
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
 def test_a_damaged_archive_is_a_rejection(tmp_path: Path, name: str, part: float):
     archive = pack(tmp_path / name)
@@ -119,7 +105,7 @@ def test_damaged_members_are_refused(tmp_path: Path):
         open_file(archive / "three.AT2")
 
 
-MANY = 50_000
+MANY = 2_000
 
 
 def tar(path: Path, members: Iterable[tuple[str, bytes]], mode: str = "w") -> Path:
@@ -301,46 +287,15 @@ def test_encrypted_and_unknown_packing_are_rows(tmp_path: Path):
     ]
 
 
-class Zeros:
-    """A file of zeros of any length, of which no byte is in memory."""
-
-    def __init__(self, size: int) -> None:
-        self.left = size
-
-    def read(self, size: int) -> bytes:
-        piece = bytes(min(size, self.left))
-        self.left -= len(piece)
-        return piece
-
-
-def zero_tar(path: Path, size: int) -> Path:
-    """Write a compressed tar of one member of zeros."""
-    with tarfile.open(path, "w:gz", compresslevel=1) as packed:
-        info = tarfile.TarInfo("zeros.AT2")
-        info.size = size
-        packed.addfile(info, Zeros(size))  # type: ignore[arg-type]
-    return path
-
-
-def zero_zip(path: Path, size: int) -> Path:
-    """Write a zip of one member of zeros."""
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed,
-        packed.open("zeros.AT2", "w", force_zip64=True) as file,
-    ):
-        for _ in range(size // 2**20):
-            file.write(bytes(2**20))
-    return path
-
-
 #: Unpacked size of a bomb: beyond the 64 MiB from which the ratio counts.
 BOMB = 96 * 2**20
 
 
-@pytest.mark.parametrize("write", [zero_tar, zero_zip])
-def test_a_bomb_is_one_row_and_takes_no_memory(tmp_path: Path, write):
-    name = {"zero_tar": "bomb.tar.gz", "zero_zip": "bomb.zip"}[write.__name__]
-    bomb = write(tmp_path / name, BOMB)
+@pytest.mark.parametrize("name", ["bomb.tar.gz", "bomb.zip"])
+def test_a_bomb_is_one_row_and_takes_no_memory(tmp_path: Path, name: str):
+    members = [("zeros.AT2", bytes(BOMB))]
+    path = tmp_path / name
+    bomb = zipped(path, members) if name == "bomb.zip" else tar(path, members, "w:gz")
     assert bomb.stat().st_size < 2**20
     (tmp_path / "good.AT2").write_bytes(AT2)
     tracemalloc.start()
@@ -427,57 +382,12 @@ def test_a_size_that_a_zip_understates_is_damage(tmp_path: Path):
         open_file(path)
 
 
-def many_tar(path: Path, many: int) -> Path:
-    """Write a tar of many members of one block each."""
-    template = tarfile.TarInfo("000000.txt")
-    template.size = 5
-    head = template.tobuf(tarfile.USTAR_FORMAT)
-    zero = sum(head) - sum(head[148:156]) + 8 * 32 - 6 * ord("0")
-    with path.open("wb") as file:
-        for number in range(many):
-            digits = b"%06d" % number
-            checksum = b"%06o\0 " % (zero + sum(digits))
-            file.write(digits + head[6:148] + checksum + head[156:])
-            file.write(b"words".ljust(512, b"\0"))
-        file.write(bytes(1024))
-    return path
-
-
-def many_zip(path: Path, many: int) -> Path:
-    """Write a zip of many stored members; more than 65535 need the end records of zip64."""
-    content, listed = b"words", io.BytesIO()
-    facts = struct.pack("<HHHHHIIIHH", 20, 0, 0, 0, 33, zlib.crc32(content), 5, 5, 10, 0)
-    with path.open("wb") as file:
-        for number in range(many):
-            name = b"%06d.txt" % number
-            place = struct.pack("<HHHII", 0, 0, 0, 0, file.tell())
-            listed.write(b"PK\x01\x02\x14\0" + facts + place + name)
-            file.write(b"PK\x03\x04" + facts + name + content)
-        start, size = file.tell(), listed.tell()
-        file.write(listed.getvalue())
-        numbers = (44, 45, 45, 0, 0, many, many, size, start)
-        file.write(b"PK\x06\x06" + struct.pack("<QHHIIQQQQ", *numbers))
-        file.write(b"PK\x06\x07" + struct.pack("<IQI", 0, start + size, 1))
-        ends = (0, 0, 0xFFFF, 0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF, 0)
-        file.write(b"PK\x05\x06" + struct.pack("<HHHHIIH", *ends))
-    return path
-
-
-def many_packed(path: Path, many: int) -> Path:
-    """Compress the tar of many members."""
-    plain = many_tar(path.with_suffix(""), many)
-    path.write_bytes(gzip.compress(plain.read_bytes(), compresslevel=1))
-    plain.unlink()
-    return path
-
-
-@pytest.mark.parametrize(
-    ("name", "write", "many"),
-    # packing again tests nothing that the plain tar does not, but takes longer
-    [("a.tar", many_tar, MANY), ("a.zip", many_zip, MANY), ("a.tar.gz", many_packed, MANY // 20)],
-)
-def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name, write, many):
-    archive = write(tmp_path / name, many)
+@pytest.mark.parametrize("name", ["a.tar", "a.zip", "a.tar.gz"])
+def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name: str):
+    members = [(f"{number:06d}.txt", b"words") for number in range(MANY)]
+    mode = "w:gz" if name == "a.tar.gz" else "w"
+    path = tmp_path / name
+    archive = zipped(path, members) if name == "a.zip" else tar(path, members, mode)
     # every opening of the archive and every member that is described
     opened, described = [], []
     listed = Archive.listed
@@ -490,12 +400,12 @@ def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name, write, 
 
     monkeypatch.setattr(Archive, "listed", counted)
     files, rejected = archive_files(archive)
-    assert (len(files), rejected) == (many, [])
+    assert (len(files), rejected) == (MANY, [])
     # members of all parts, the last first
     for path in files[::-100]:
         assert open_file(path).read() == b"words"
     assert len(opened) == 1
-    assert len(described) == many
+    assert len(described) == MANY
 
 
 def test_a_changed_archive_is_walked_again(tmp_path: Path):

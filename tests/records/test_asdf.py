@@ -148,11 +148,6 @@ def test_a_tag_that_is_not_there_names_those_that_are(workspace: Path):
         find_asdf_stations(workspace, "x")
 
 
-def test_the_event(workspace: Path, simulation: Simulation):
-    assert has_event(workspace)
-    assert read_event(workspace).origins[0].time == simulation.event.origins[0].time
-
-
 def test_other_files_are_refused(tmp_path: Path):
     (tmp_path / "text.h5").write_text("no HDF5")
     assert not is_asdf(tmp_path / "text.h5")

@@ -200,13 +200,6 @@ def test_names_with_wildcards_mean_themselves(tmp_path: Path):
     assert trace.stats.channel == "HN1"
 
 
-def test_a_file_and_its_bytes_are_read_alike(tmp_path: Path):
-    path = tmp_path / "record.mseed"
-    record("HN1").write(str(path), format="MSEED")
-    (trace,) = read_bytes_with_obspy(obspy.read, path.read_bytes(), "service", format="MSEED")
-    assert trace == read_with_obspy(obspy.read, path)[0]
-
-
 @pytest.mark.parametrize(
     ("content", "options", "reason"),
     [

@@ -6,7 +6,6 @@ Covers per_obspy.records.file_list too: the files on which a result depends.
 
 import re
 import tomllib
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
 from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.file_list import input_files
-from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.sources import find_path_sources, find_sources
 from per_obspy.simulation.earthquake import Simulation, scenario_event, simulate, write_simulation
@@ -191,12 +189,6 @@ def test_files_of_a_station_in_several_paths_are_joined(folder: Path, tmp_path: 
 def test_a_wrong_event_stops_at_once(folder: Path):
     with pytest.raises(CatalogError, match=r"stations\.xml"):
         find_sources(Records(folder=folder, event=folder / "stations.xml"), None)
-
-
-def test_readers_travel_to_other_processes_by_name(folder: Path):
-    for source in find_sources(Records(folder=folder), None).stations.values():
-        assert isinstance(source.reader, partial)
-        assert source.reader.func is read_station
 
 
 @pytest.mark.real_data

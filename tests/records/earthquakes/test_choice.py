@@ -97,13 +97,6 @@ def test_a_file_that_holds_both_earthquakes_is_read_in_the_window_of_one(
         np.testing.assert_array_equal(trace.data, alone.data)
 
 
-def test_one_earthquake_is_read_as_before(both: Path):
-    sources = screened(both / "main")
-    assert sources.rejected == ()
-    assert sources.stations["XX.S001"].reader.keywords == {}
-    assert [group["stations"] for group in sources.earthquakes] == [3]
-
-
 def test_the_largest_motion_is_the_peak_of_the_strongest_record(both: Path):
     found = find_stations(both)
     motion = partial(largest_motion, found)

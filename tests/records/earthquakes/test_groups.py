@@ -137,11 +137,6 @@ def test_pads_of_processed_records_do_not_count():
     assert (record.start, record.end) == (MAIN, MAIN + 100)
 
 
-def test_the_group_of_most_stations_is_chosen():
-    groups = event_groups([span("N.A", FORE), span("N.B", FORE), span("N.A", MAIN)])
-    assert chosen_group(groups, None, "", no_motion) is groups[0]
-
-
 def as_strong(group: EventGroup) -> float:
     return 0.0 * group.stations  # the same of every group
 

@@ -107,30 +107,11 @@ def test_no_event_is_an_empty_list(server: FdsnServer):
     assert find_events(server.url, {}) == []
 
 
-def test_quakeml(simulation: Simulation, tmp_path: Path):
-    Catalog([simulation.event]).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    (row,) = find_events(str(tmp_path / "event.xml"), {})
-    assert (row.latitude, row.depth, row.magnitude) == (-1.5, 12_000.0, 6.5)
-
-
 @pytest.mark.parametrize("wrong", [b"{", b"{}", feed({"id": 1}), b"<html>", b"", b"\xff\xfe"])
 def test_files_that_are_no_list_are_wrong_input(tmp_path: Path, wrong: bytes):
     (tmp_path / "file").write_bytes(wrong)
     with pytest.raises(CatalogError, match="file: is no list of events"):
         find_events(str(tmp_path / "file"), {})
-
-
-@pytest.mark.parametrize(
-    ("origins", "reason"),
-    [
-        ([], "has no origin"),
-        ([Origin(latitude=1.0, longitude=2.0)], "an origin without time"),
-    ],
-)
-def test_an_event_without_origin_or_time_is_refused(tmp_path: Path, origins, reason: str):
-    Catalog([Event(origins=origins)]).write(str(tmp_path / "event.xml"), format="QUAKEML")
-    with pytest.raises(CatalogError, match=reason):
-        find_events(str(tmp_path / "event.xml"), {})
 
 
 @pytest.mark.parametrize(

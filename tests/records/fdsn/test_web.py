@@ -31,22 +31,6 @@ def stations(server: FdsnServer, pool: WebPool, **parameters: str) -> bytes:
     return answer(pool, f"{server.url}/fdsnws/station/1/query", LIST | parameters)
 
 
-def test_a_whole_answer_comes_back(server: FdsnServer, pool: WebPool):
-    assert b"|S001|" in stations(server, pool)
-
-
-def test_no_data_is_an_empty_answer(server: FdsnServer, pool: WebPool):
-    assert stations(server, pool, network="YY") == b""
-
-
-@pytest.mark.parametrize("fault", [status(503), status(429), cut])
-def test_faults_that_pass_are_tried_again(server: FdsnServer, pool: WebPool, fault):
-    before = server.asked("station")
-    server.fail("station", "*", fault)
-    assert b"|S001|" in stations(server, pool)
-    assert server.asked("station") == before + 2
-
-
 @pytest.mark.parametrize(
     ("code", "error", "message"),
     [
