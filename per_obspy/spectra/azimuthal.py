@@ -149,6 +149,7 @@ def _spectra(
     periods: ArrayLike,
     damping: ArrayLike = REFERENCE_DAMPING,
     azimuths: ArrayLike = EVERY_AZIMUTH,
+    *,
     exact: bool = True,
 ) -> list[FloatArray]:
     """Return the largest ``sqrt(u² + share z²)`` along each azimuth, one array per share."""

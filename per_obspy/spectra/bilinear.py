@@ -211,8 +211,8 @@ def constant_yield_spectra(
         for omega, limit in zip(omegas, limits, strict=True)
     ]
     # Histories are left out
-    *lengths, ductility, residual, energy = np.array(rows).T.copy()
-    return InelasticSpectra(*lengths, ductility, coefficients.copy(), residual, energy)
+    total, elastic, sd, ductility, residual, energy = np.array(rows).T.copy()
+    return InelasticSpectra(total, elastic, sd, ductility, coefficients.copy(), residual, energy)
 
 
 def _hardening(hardening: float) -> float:

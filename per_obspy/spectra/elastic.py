@@ -387,6 +387,7 @@ def _radii(
     dt: float,
     periods: ArrayLike,
     damping: ArrayLike = REFERENCE_DAMPING,
+    *,
     exact: bool = True,
 ) -> FloatArray:
     """Return the largest radius of each oscillator of a grid, m, between samples too if exact."""
@@ -400,6 +401,7 @@ def _responses(
     dt: float,
     periods: ArrayLike,
     damping: ArrayLike = REFERENCE_DAMPING,
+    *,
     exact: bool = True,
 ) -> ResponseSpectra:
     """Return the six spectra of a grid of oscillators, between samples too if exact."""
