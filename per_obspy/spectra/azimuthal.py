@@ -123,22 +123,22 @@ def azimuthal_spectra(
     return per, sd
 
 
-def sampled_azimuthal_per_spectrum(*arguments: Any) -> FloatArray:
+def sampled_azimuthal_per_spectrum(*arguments: Any, **options: Any) -> FloatArray:
     """
     Compute `azimuthal_per_spectrum` from the maxima at the samples alone, m.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _spectra((RADIUS,), *arguments, exact=False)[0]
+    return _spectra((RADIUS,), *arguments, **options, exact=False)[0]
 
 
-def sampled_azimuthal_sd_spectrum(*arguments: Any) -> FloatArray:
+def sampled_azimuthal_sd_spectrum(*arguments: Any, **options: Any) -> FloatArray:
     """
     Compute `azimuthal_sd_spectrum` from the maxima at the samples of the record alone, m.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _spectra((DISPLACEMENT,), *arguments, exact=False)[0]
+    return _spectra((DISPLACEMENT,), *arguments, **options, exact=False)[0]
 
 
 def _spectra(

@@ -265,22 +265,22 @@ def response_spectra(
     return _responses(acceleration, dt, periods, damping)
 
 
-def sampled_per_spectrum(*motion_and_oscillators: Any) -> FloatArray:
+def sampled_per_spectrum(*arguments: Any, **options: Any) -> FloatArray:
     """
     Compute `per_spectrum` from the maxima at the samples alone, m.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _radii(*motion_and_oscillators, exact=False)
+    return _radii(*arguments, **options, exact=False)
 
 
-def sampled_response_spectra(*motion_and_oscillators: Any) -> ResponseSpectra:
+def sampled_response_spectra(*arguments: Any, **options: Any) -> ResponseSpectra:
     """
     Compute `response_spectra` from the maxima at the samples alone.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _responses(*motion_and_oscillators, exact=False)
+    return _responses(*arguments, **options, exact=False)
 
 
 def _arguments(
