@@ -203,18 +203,7 @@ def _trace(values: FloatArray, dt: float, header: _Header, words: Words) -> Trac
 
 
 def _read_header(text: Text, first: int, text_lines: int, reals: int) -> _Header:
-    """
-    Read the header of one channel.
-
-    Parameters
-    ----------
-    text : Text
-        The file.
-    first : int
-        Line of the first of the thirteen common lines.
-    text_lines, reals : int
-        Lines of text from there to the integers, real numbers after those.
-    """
+    """Read the header of one channel, from its first common line, with lines of text and reals."""
     line_at(text, first + _HEADER_LINES - 1, "header")
     lines = [line.upper() for line in text.lines[first : first + _HEADER_LINES]]
     channel = _CHANNEL.fullmatch(lines[6].strip())
@@ -315,25 +304,15 @@ def _event(text: Text, first: int, lines: list[str]) -> Words:
 
 
 class OfficialSpectra(NamedTuple):
-    """
-    Response spectra of one channel as the agency computed them.
+    """Response spectra of one channel as the agency computed them."""
 
-    Attributes
-    ----------
-    channel : int
-        Number in the file.
-    periods : (n_periods,) ndarray
-        Undamped periods, s.
-    damping : (n_damping,) ndarray
-        Fractions of critical.
-    sd, sv, sa, psv : (n_damping, n_periods) ndarray
-        Relative displacement, m; relative velocity, m/s; absolute acceleration, m/s2; pseudo
-        velocity, m/s.
-    """
-
+    #: number in the file
     channel: int
+    #: undamped periods, s, (n_periods,), and fractions of critical, (n_damping,)
     periods: FloatArray
     damping: FloatArray
+    #: relative displacement, m, and velocity, m/s; absolute acceleration, m/s2; pseudo velocity,
+    #: m/s; each (n_damping, n_periods)
     sd: FloatArray
     sv: FloatArray
     sa: FloatArray
@@ -377,7 +356,10 @@ def _spectra_channel(text: Text, first: int) -> tuple[OfficialSpectra, int]:
         for kind in range(_ARRAYS):
             values[kind, index] = _slots(text, line + 1 + kind * _SLOT_LINES, periods)
         line += _ARRAYS * _SLOT_LINES + 1
-    return _in_si(header.channel, grid, damping, values), line
+    # Inches and fractions of gravity
+    sd, sv, sa, psv = values[:4]
+    lengths = sd * _INCH, sv * _INCH, sa * STANDARD_GRAVITY, psv * _INCH
+    return OfficialSpectra(header.channel, grid, damping, *lengths), line
 
 
 def _spectra_size(text: Text, line: int) -> tuple[int, int]:
@@ -386,16 +368,6 @@ def _spectra_size(text: Text, line: int) -> tuple[int, int]:
     if not 0 < periods <= _SLOTS or not 0 < dampings <= 8:
         refuse(text, line + 4, "periods, dampings", f"{periods} and {dampings}")
     return periods, dampings
-
-
-def _in_si(
-    channel: int, periods: FloatArray, damping: FloatArray, values: FloatArray
-) -> OfficialSpectra:
-    """Return spectra in SI from inches and fractions of gravity."""
-    sd, sv, sa, psv = values[:4]
-    return OfficialSpectra(
-        channel, periods, damping, sd * _INCH, sv * _INCH, sa * STANDARD_GRAVITY, psv * _INCH
-    )
 
 
 def _slots(text: Text, line: int, periods: int) -> FloatArray:

@@ -17,12 +17,8 @@ def with_knet_words(record: Trace) -> Trace:
     """
     Return a copy of a K-NET trace with the words of the vocabulary.
 
-    Samples stay counts, with the gain in ``calib`` (m/s2 per count).
-
-    Raises
-    ------
-    RecordRejected
-        If the file is shorter than its header promises: ObsPy reads a cut file as a shorter record.
+    Samples stay counts, with the gain in ``calib`` (m/s2 per count). A file that is shorter than
+    its header promises is refused: ObsPy reads a cut file as a shorter record.
     """
     header = record.stats.knet
     seconds = record.stats.npts * record.stats.delta
@@ -61,17 +57,7 @@ def require_whole_numbers(content: bytes, name: str) -> None:
     """
     Refuse a file that ends inside its last number, which ObsPy would read as a smaller one.
 
-    Parameters
-    ----------
-    content : bytes
-        Of a K-NET file.
-    name : str
-        Of the file, for the message.
-
-    Raises
-    ------
-    RecordRejected
-        If the last line stops inside a column, whether it has an end or not.
+    The last line then stops inside a column, whether it has an end or not.
     """
     *_, line_before, last = [b"", b"", *content.rstrip(b"\x00\r\n ").splitlines()]
     is_sample_line = not line_before.strip(b"0123456789- ")

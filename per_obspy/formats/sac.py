@@ -20,21 +20,9 @@ _LARGEST = 360.0
 
 def require_coordinates(content: bytes, name: str) -> None:
     """
-    Check the coordinates of a SAC file, of which ObsPy computes a distance.
+    Refuse a SAC file with a coordinate that is none, of which ObsPy computes a distance.
 
     ObsPy turns a longitude by 360 degrees until it is one, which for 1e30 never ends.
-
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    name : str
-        Of the file, for messages.
-
-    Raises
-    ------
-    RecordRejected
-        If a coordinate is none.
 
     Examples
     --------

@@ -269,7 +269,7 @@ def _filter(trace: Trace, settings: Processing) -> Trace:
     trace = with_usable_periods(trace, settings.usable)
     findings = final_findings(trace, settings.checks)
     if settings.permanent_offset:
-        findings = [one for one in findings if one.check != "final_displacement"]
+        findings[:] = [one for one in findings if one.check != "final_displacement"]
     # A second pass keeps a processed record with its corners
     trace = copy_header(judge(trace, findings))
     trace.stats.processing_level, trace.stats.corners = "processed", corners

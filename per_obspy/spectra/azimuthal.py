@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def azimuthal_per_spectrum(
     >>> azimuthal_per_spectrum(north, east, 0.01, [1.0], azimuths=[0, 90]).round(4)
     array([[0.0047, 0.0063]])
     """
-    return _spectra(north, east, dt, periods, damping, azimuths, (RADIUS,))[0]
+    return _spectra((RADIUS,), north, east, dt, periods, damping, azimuths)[0]
 
 
 def azimuthal_sd_spectrum(
@@ -101,7 +102,7 @@ def azimuthal_sd_spectrum(
 
     Arguments and shape of the result are those of `azimuthal_per_spectrum`.
     """
-    return _spectra(north, east, dt, periods, damping, azimuths, (DISPLACEMENT,))[0]
+    return _spectra((DISPLACEMENT,), north, east, dt, periods, damping, azimuths)[0]
 
 
 def azimuthal_spectra(
@@ -118,50 +119,37 @@ def azimuthal_spectra(
     Arguments and shapes of both results are those of `azimuthal_per_spectrum`, without traces.
     """
     both = RADIUS, DISPLACEMENT
-    per, sd = _spectra(north, east, dt, periods, damping, azimuths, both)
+    per, sd = _spectra(both, north, east, dt, periods, damping, azimuths)
     return per, sd
 
 
-def sampled_azimuthal_per_spectrum(
-    north: ArrayLike,
-    east: ArrayLike,
-    dt: float,
-    periods: ArrayLike,
-    damping: ArrayLike = REFERENCE_DAMPING,
-    azimuths: ArrayLike = EVERY_AZIMUTH,
-) -> FloatArray:
+def sampled_azimuthal_per_spectrum(*arguments: Any, **options: Any) -> FloatArray:
     """
     Compute `azimuthal_per_spectrum` from the maxima at the samples alone, m.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _spectra(north, east, dt, periods, damping, azimuths, (RADIUS,), exact=False)[0]
+    return _spectra((RADIUS,), *arguments, **options, exact=False)[0]
 
 
-def sampled_azimuthal_sd_spectrum(
+def sampled_azimuthal_sd_spectrum(*arguments: Any, **options: Any) -> FloatArray:
+    """
+    Compute `azimuthal_sd_spectrum` from the maxima at the samples of the record alone, m.
+
+    For benchmarks and tests against programs that look at samples only; arguments as there.
+    """
+    return _spectra((DISPLACEMENT,), *arguments, **options, exact=False)[0]
+
+
+def _spectra(
+    shares: tuple[float, ...],
     north: ArrayLike,
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
     damping: ArrayLike = REFERENCE_DAMPING,
     azimuths: ArrayLike = EVERY_AZIMUTH,
-) -> FloatArray:
-    """
-    Compute `azimuthal_sd_spectrum` from the maxima at the samples of the record alone, m.
-
-    For benchmarks and tests against programs that look at samples only; arguments as there.
-    """
-    return _spectra(north, east, dt, periods, damping, azimuths, (DISPLACEMENT,), exact=False)[0]
-
-
-def _spectra(
-    north: ArrayLike,
-    east: ArrayLike,
-    dt: float,
-    periods: ArrayLike,
-    damping: ArrayLike,
-    azimuths: ArrayLike,
-    shares: tuple[float, ...],
+    *,
     exact: bool = True,
 ) -> list[FloatArray]:
     """Return the largest ``sqrt(u² + share z²)`` along each azimuth, one array per share."""

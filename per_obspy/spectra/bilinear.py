@@ -1,6 +1,7 @@
 """Bilinear oscillators: histories, and inelastic PER spectra of given strength."""
 
 import math
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -83,6 +84,17 @@ class InelasticSpectra(NamedTuple):
     yield_coefficient: FloatArray
     residual: FloatArray
     hysteretic_energy: FloatArray
+
+
+#: The largest values of a response that are stored by period.
+LARGEST = attrgetter(
+    "displacement_radius",
+    "energy_radius",
+    "displacement_maximum",
+    "ductility",
+    "residual",
+    "hysteretic_energy",
+)
 
 
 @takes_trace
@@ -193,17 +205,22 @@ def constant_yield_spectra(
     >>> print(spectra.ductility.round(2), spectra.sd.round(3))
     [3.07 2.53 1.02] [0.019 0.063 0.102]
     """
-    record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
+    record = checks.record("acceleration", acceleration)
+    omegas = 2.0 * np.pi / row_of("periods", periods)
+    ratio = checks.number("damping", damping, checks.fraction_of_critical)
+    dt, alpha = checks.number("dt", dt, checks.positive), _hardening(hardening)
     # Yield displacement from the yield force over the weight: C g / omega²
     coefficients = np.broadcast_to(
         checks.positive("yield_coefficients", yield_coefficients), omegas.shape
     )
     limits = coefficients * STANDARD_GRAVITY / omegas**2
     rows = [
-        _response(record, dt, omega, ratio, limit, alpha)
+        LARGEST(_response(record, dt, omega, ratio, limit, alpha))
         for omega, limit in zip(omegas, limits, strict=True)
     ]
-    return _spectra(rows, coefficients.copy())
+    # Histories are left out
+    total, elastic, sd, ductility, residual, energy = np.array(rows).T.copy()
+    return InelasticSpectra(total, elastic, sd, ductility, coefficients.copy(), residual, energy)
 
 
 def _hardening(hardening: float) -> float:
@@ -211,17 +228,6 @@ def _hardening(hardening: float) -> float:
     return checks.number(
         "hardening", hardening, lambda name, value: checks.between(name, value, 0.0, 1.0)
     )
-
-
-def _arguments(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, hardening: float
-) -> tuple[FloatArray, float, FloatArray, float, float]:
-    """Return record, interval, omegas in rad/s, damping and hardening."""
-    record = checks.record("acceleration", acceleration)
-    omegas = 2.0 * np.pi / row_of("periods", periods)
-    ratio = checks.number("damping", damping, checks.fraction_of_critical)
-    dt = checks.number("dt", dt, checks.positive)
-    return record, dt, omegas, ratio, _hardening(hardening)
 
 
 def _response(
@@ -252,18 +258,4 @@ def _response(
         residual=float((1.0 - hardening) * structure[columns.PLASTIC]),
         displacement_radius=float(np.sqrt(structure[columns.LARGEST_RADIUS_SQUARED])),
         energy_radius=float(np.sqrt(structure[columns.LARGEST_ENERGY_RADIUS_SQUARED])),
-    )
-
-
-def _spectra(rows: list[BilinearResponse], coefficients: FloatArray) -> InelasticSpectra:
-    """Return the largest values of one response per period as arrays."""
-    # Histories are left out
-    return InelasticSpectra(
-        displacement_radius=np.array([row.displacement_radius for row in rows]),
-        energy_radius=np.array([row.energy_radius for row in rows]),
-        sd=np.array([row.displacement_maximum for row in rows]),
-        ductility=np.array([row.ductility for row in rows]),
-        yield_coefficient=coefficients,
-        residual=np.array([row.residual for row in rows]),
-        hysteretic_energy=np.array([row.hysteretic_energy for row in rows]),
     )

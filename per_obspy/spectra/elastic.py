@@ -8,7 +8,7 @@ threads: a block is computed by one of them.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -265,26 +265,22 @@ def response_spectra(
     return _responses(acceleration, dt, periods, damping)
 
 
-def sampled_per_spectrum(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
-) -> FloatArray:
+def sampled_per_spectrum(*arguments: Any, **options: Any) -> FloatArray:
     """
     Compute `per_spectrum` from the maxima at the samples alone, m.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _radii(acceleration, dt, periods, damping, exact=False)
+    return _radii(*arguments, **options, exact=False)
 
 
-def sampled_response_spectra(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
-) -> ResponseSpectra:
+def sampled_response_spectra(*arguments: Any, **options: Any) -> ResponseSpectra:
     """
     Compute `response_spectra` from the maxima at the samples alone.
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _responses(acceleration, dt, periods, damping, exact=False)
+    return _responses(*arguments, **options, exact=False)
 
 
 def _arguments(
@@ -387,7 +383,12 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
 
 
 def _radii(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike, exact: bool = True
+    acceleration: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    *,
+    exact: bool = True,
 ) -> FloatArray:
     """Return the largest radius of each oscillator of a grid, m, between samples too if exact."""
     record, oscillators, shape = _arguments(acceleration, dt, periods, damping)
@@ -396,7 +397,12 @@ def _radii(
 
 
 def _responses(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike, exact: bool = True
+    acceleration: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    *,
+    exact: bool = True,
 ) -> ResponseSpectra:
     """Return the six spectra of a grid of oscillators, between samples too if exact."""
     record, oscillators, shape = _arguments(acceleration, dt, periods, damping)

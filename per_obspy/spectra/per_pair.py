@@ -10,7 +10,6 @@ from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.maxima.oscillator_maxima import largest_responses
 from per_obspy.spectra.elastic import (
     Oscillators,
-    TiledRecord,
     in_threads,
     prepare_oscillators,
     row_of,
@@ -74,22 +73,7 @@ def azimuth_maxima(
     motion after it altogether.
     """
     record = tiled_record(*two_components(north, east))
-    return _maxima(record, _paired(dt, periods, dampings, azimuths))
-
-
-def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike) -> Oscillators:
-    """Return checked oscillators, (n,)."""
-    dt = checks.number("dt", dt, checks.positive)
-    period, damping, azimuth = np.broadcast_arrays(
-        np.atleast_1d(checks.positive("periods", periods)),
-        checks.fraction_of_critical("dampings", dampings),
-        checks.finite("azimuths", azimuths),
-    )
-    return prepare_oscillators(dt, row_of("periods", period), damping, azimuth)
-
-
-def _maxima(record: TiledRecord, oscillators: Oscillators) -> OscillatorMaxima:
-    """Return largest radius and displacement of each oscillator; a part has one stride."""
+    oscillators = _paired(dt, periods, dampings, azimuths)
     # Peak acceleration of groups of tiles, for the search of an oscillator's window
     width = -(-record.peaks.shape[1] // GROUPS)
     firsts = np.arange(0, record.peaks.shape[1], width)
@@ -109,6 +93,17 @@ def _maxima(record: TiledRecord, oscillators: Oscillators) -> OscillatorMaxima:
     in_threads(work, _parts(oscillators), oscillators.size * record.north.size)
     largest[0] = np.sqrt(largest[0])
     return OscillatorMaxima(*(largest / oscillators.omegas**2 * record.scale))
+
+
+def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike) -> Oscillators:
+    """Return checked oscillators, (n,)."""
+    dt = checks.number("dt", dt, checks.positive)
+    period, damping, azimuth = np.broadcast_arrays(
+        np.atleast_1d(checks.positive("periods", periods)),
+        checks.fraction_of_critical("dampings", dampings),
+        checks.finite("azimuths", azimuths),
+    )
+    return prepare_oscillators(dt, row_of("periods", period), damping, azimuth)
 
 
 def _parts(oscillators: Oscillators) -> list[tuple[int, NDArray[np.int64]]]:

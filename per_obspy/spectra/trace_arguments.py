@@ -33,6 +33,9 @@ _STEP = re.compile(
 
 _OUTPUT = re.compile(r"\boutput\s*=\s*[\"']?(\w+)")
 
+#: Component -> last letters of channels that are another one.
+OTHERS = {"north": "EZ", "east": "NZ"}
+
 P = ParamSpec("P")
 Result = TypeVar("Result", covariant=True)
 
@@ -78,38 +81,30 @@ def takes_trace(
     function: Callable[Concatenate[ArrayLike, float, P], Result],
 ) -> OfOneComponent[P, Result]:
     """Let a function of ``acceleration, dt`` take one Trace instead of both."""
-    of_samples: Callable[..., Result] = function
-
-    @wraps(function)
-    def with_trace(*args: Any, **kwargs: Any) -> Result:
-        traces = _leading_traces(("acceleration",), args, kwargs)
-        if traces is None:
-            return of_samples(*args, **kwargs)
-        # In m/s², with the interval of its header
-        samples = _samples("acceleration", traces[0])
-        others = _others(function.__name__, ("acceleration",), args, kwargs)
-        return of_samples(samples, float(traces[0].stats.delta), **others)
-
-    return with_trace
+    return _taking(("acceleration",), function)
 
 
 def takes_traces(
     function: Callable[Concatenate[ArrayLike, ArrayLike, float, P], Result],
 ) -> OfTwoComponents[P, Result]:
     """Let a function of ``north, east, dt`` take two Traces instead of these three."""
-    of_samples: Callable[..., Result] = function
+    return _taking(("north", "east"), function)
+
+
+def _taking(names: tuple[str, ...], function: Callable[..., Result]) -> Callable[..., Result]:
+    """Let a function of some components and ``dt`` take a Trace for each component."""
 
     @wraps(function)
     def with_traces(*args: Any, **kwargs: Any) -> Result:
-        traces = _leading_traces(("north", "east"), args, kwargs)
+        traces = _leading_traces(names, args, kwargs)
         if traces is None:
-            return of_samples(*args, **kwargs)
-        _require_same_times(*traces)
-        # Both in m/s², and neither in the place of the other
-        north = _samples("north", traces[0], unlike="EZ")
-        east = _samples("east", traces[1], unlike="NZ")
-        others = _others(function.__name__, ("north", "east"), args, kwargs)
-        return of_samples(north, east, float(traces[0].stats.delta), **others)
+            return function(*args, **kwargs)
+        if len(traces) > 1:
+            _require_same_times(*traces)
+        # In m/s², with the interval of the header
+        samples = map(_samples, names, traces)
+        others = _others(function.__name__, names, args, kwargs)
+        return function(*samples, float(traces[0].stats.delta), **others)
 
     return with_traces
 
@@ -142,12 +137,12 @@ def _others(
     return {name: value for name, value in kwargs.items() if name not in names}
 
 
-def _samples(name: str, trace: AccelerationTrace, unlike: str = "") -> NDArray[Any]:
+def _samples(name: str, trace: AccelerationTrace) -> NDArray[Any]:
     """Return the samples of a Trace of acceleration in m/s²."""
     stats = trace.stats
-    # The last letter of a channel is the direction of its sensor
+    # The last letter of a channel is the direction of its sensor: none of another component
     component = str(stats.channel)[-1:]
-    if component and component in unlike:
+    if component and component in OTHERS.get(name, ""):
         raise ValueError(f"{name} is the Trace {trace.stats.channel!r}: give north, then east")
     unit = unit_after_steps(stats)
     if unit == ACCELERATION:

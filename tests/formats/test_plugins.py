@@ -395,22 +395,6 @@ def test_a_wrong_letter_of_a_place_is_mended_by_the_epicentre_and_noted(
         assert trace.stats.processing[-1].endswith("taken, the epicentre's side")
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        ("usc_v1", "34 06 36N, 118 22 48W", "34 06 36N, 118 72 48W"),
-        ("dyna", "STATION_LATITUDE_DEGREE: 37.6349", "STATION_LATITUDE_DEGREE: 376349"),
-        ("smc", "3.7728000E+01", "3.7728000E+04"),
-    ],
-)
-def test_a_place_out_of_range_is_unknown_and_noted(name: str, old: str, new: str):
-    sample = SAMPLES[name]
-    assert old in sample.text
-    for trace in read(sample, sample.text.replace(old, new)):
-        assert "coordinates" not in trace.stats
-        assert trace.stats.processing[-1].endswith("out of range, so the place is unknown")
-
-
 def test_a_count_of_more_than_six_digits_is_not_rounded():
     sample = SAMPLES["smc"]
     changed = sample.text.replace(f"{len(sample.values[0]):10d}", f"{1_000_001:10d}", 1)

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from obspy import Inventory, Stream, Trace, UTCDateTime, read, read_inventory
-from obspy.core import AttribDict
 
 from per_obspy.config import Checks, Processing
 from per_obspy.errors import RecordRejected
@@ -91,14 +90,6 @@ def test_horizontals_have_the_same_times_after_padding():
     out = process(Stream([trace("HNE"), trace("HNN", starttime=UTCDateTime(2020, 1, 1) + 1.003)]))
     assert out[0].stats.starttime == out[1].stats.starttime
     assert out[0].stats.npts == out[1].stats.npts
-
-
-def test_records_processed_already_pass_through():
-    corners = AttribDict(highpass=0.1, lowpass=30.0)
-    out = process(station(processing_level="processed", corners=corners))[0]
-    assert_array_equal(out.data, pulse())
-    assert (out.stats.per_obspy.highpass, out.stats.per_obspy.lowpass) == (0.1, 30.0)
-    assert out.stats.per_obspy.highpass_source == "header"
 
 
 def test_a_bad_trace_is_rejected_alone():
@@ -260,13 +251,6 @@ def test_it_covers_the_processed_time_without_the_pads(earthquake, settings):
     same = trace.data[first : first + before.stats.npts]
     quiet = same[: round(chosen.noise * 100)].mean()
     assert_allclose(before.data, same - quiet, atol=1e-12)
-
-
-def test_the_mean_is_that_of_the_noise(earthquake):
-    trace = recorded(earthquake() + 0.3)
-    processed = process_station(Stream([trace]), SETTINGS)[0][0]
-    before = before_processing(Stream([trace]), processed, SETTINGS)
-    assert abs(before.data[:1500].mean()) < 1e-5
 
 
 def test_another_channel_is_not_it_and_a_record_processed_by_others_has_none(earthquake):

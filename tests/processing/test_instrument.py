@@ -56,18 +56,6 @@ def test_horizontals_share_their_corners_and_the_vertical_has_its_own(record):
     assert {"shared"} < {east.highpass_source, north.highpass_source}
 
 
-def test_noise_is_measured_before_the_wave_of_the_vertical(record):
-    out, _ = process_instrument(Stream([record("HNE"), record("HNZ", 3)]), SETTINGS, None)
-    assert out[0].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
-
-
-def test_an_outlier_is_dropped_with_its_figure(record):
-    three = Stream([record("HNE"), record("HNN", 2, factor=8.0), record("HNZ", 3)])
-    out, rejected = process_instrument(three, SETTINGS, None)
-    assert {trace.stats.channel for trace in out} == {"HNE", "HNZ"}
-    assert "peak over that of" in rejected[0].reasons[0]
-
-
 def test_one_bad_horizontal_does_not_decide_the_corners_of_the_other(record):
     alone, _ = process_instrument(Stream([record("HNE")]), SETTINGS, None)
     broken = record("HNN", 2)

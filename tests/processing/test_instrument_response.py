@@ -107,13 +107,6 @@ def test_an_overall_sensitivity_divides():
     assert_allclose(out.data, acceleration, rtol=1e-14)  # one multiplication and one division
 
 
-def test_physical_records_pass():
-    acceleration, _ = motion()
-    assert_array_equal(
-        in_acceleration(counts(acceleration, units="m/s2"), TOLERANCE).data, acceleration
-    )
-
-
 def test_the_factor_of_a_reader_of_acceleration_is_used():
     out = in_acceleration(counts(np.arange(10.0), calib=0.5, quantity="acceleration"), TOLERANCE)
     assert_array_equal(out.data, np.arange(10.0) / 2)
@@ -147,13 +140,6 @@ def test_what_cannot_be_converted_is_a_reason(stats, reason):
 def test_a_gain_within_the_tolerance_is_no_reason():
     near = counts(np.arange(100.0), response=response(stages=(GAIN, 1.09)))
     assert in_acceleration(near, TOLERANCE).stats.units == "m/s2"
-
-
-def test_inputs_stay_unchanged():
-    trace = counts(np.arange(100.0), response=response())
-    before = trace.copy()
-    in_acceleration(trace, TOLERANCE)
-    assert trace == before
 
 
 def test_knet_records_that_obspy_read_are_converted_by_their_factor():

@@ -259,10 +259,6 @@ def test_a_header_with_another_peak_is_found(earthquake, factor, is_found):
     assert ("header_peak" in checks_that_fail(trace)) is is_found
 
 
-def test_a_header_without_a_peak_has_no_finding(earthquake):
-    assert "header_peak" not in checks_that_fail(Trace(earthquake()))
-
-
 @pytest.mark.parametrize("samples", [np.arange(49.0), np.repeat([1.0, 2.0], 500)])
 def test_what_is_no_record_is_rejected_at_any_level(samples):
     lenient = Checks(

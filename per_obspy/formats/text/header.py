@@ -51,18 +51,11 @@ class HeaderField(NamedTuple):
 
 @dataclass(frozen=True)
 class Header:
-    """
-    Named values of a header.
+    """Named values of a header."""
 
-    Attributes
-    ----------
-    text : Text
-        The file.
-    fields : dict
-        Name -> HeaderField.
-    """
-
+    #: the file
     text: Text
+    #: name -> value and line
     fields: Mapping[str, HeaderField]
 
     def word(self, name: str) -> str | None:
@@ -194,18 +187,10 @@ def header_time(
     text: Text, line: int, field: str, match: Match[str] | None, hours_ahead: float = 0.0
 ) -> UTCDateTime | None:
     """
-    Return the time that a pattern found, UTC.
+    Return the time, UTC, that a pattern with parts of a time found in a field of a line.
 
-    It is None where nothing was found, or the month or zone is unknown.
-
-    Parameters
-    ----------
-    text, line, field
-        File, line and name of the header field, for the message of an impossible time.
-    match : Match or None
-        Of a pattern with parts of a time.
-    hours_ahead : float
-        Hours by which the clock is ahead of the zone.
+    It is None where nothing was found, or the month or zone is unknown. An impossible time is
+    refused. The clock may be hours ahead of the zone.
     """
     if match is None:
         return None
@@ -231,18 +216,9 @@ def utc(
     hours_ahead: float = 0.0,
 ) -> UTCDateTime:
     """
-    Return a time in UTC.
+    Return a time in UTC from year, month, day and hour, minute, second of a clock ahead of it.
 
-    Parameters
-    ----------
-    text, line, field
-        File, line and name of the header field, for the message of an impossible time.
-    date : sequence of int
-        Year, month and day.
-    clock : sequence of float
-        Hour, minute and second; midnight where it is missing.
-    hours_ahead : float
-        Hours by which the clock is ahead of UTC.
+    An impossible time is refused by the line and the name of its field.
     """
     hour, minute, second = clock
     year, month, day = date
@@ -281,21 +257,13 @@ def station_place(
     match: Match[str] | None, epicentre: Mapping[str, Any], elevation: float | None = None
 ) -> Words:
     """
-    Return the coordinates of a station; empty where they are unknown.
+    Return the coordinates of a station, found by a pattern of a place; empty where unknown.
 
     A letter that does not belong to its angle is replaced by that of the hemisphere in which the
-    station is near the epicentre; where this does not decide, the place is unknown. Either is
-    written into ``problem``, which :func:`~per_obspy.formats.text.vocabulary.trace` turns into a
-    note of the record. Letters that are merely exchanged mean that the longitude comes first.
-
-    Parameters
-    ----------
-    match : Match or None
-        Of a pattern of a place.
-    epicentre : mapping
-        ``latitude`` and ``longitude``, degrees, as far as they are known.
-    elevation : float, optional
-        m.
+    station is near the epicentre, as far as that is known; where this does not decide, the place is
+    unknown. Either is written into ``problem``, which
+    :func:`~per_obspy.formats.text.vocabulary.trace` turns into a note of the record. Letters that
+    are merely exchanged mean that the longitude comes first. The elevation is in m.
 
     >>> match = re.match(place_pattern("[0-9.]+", " "), "34.1N 118.4N")
     >>> station_place(match, {"longitude": -118.5})["longitude"]

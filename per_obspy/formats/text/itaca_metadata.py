@@ -43,19 +43,11 @@ _TIME = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d{1,6})?")
 
 
 class ItacaMetadata(NamedTuple):
-    """
-    Station and earthquake of some records.
+    """Station and earthquake of some records."""
 
-    Attributes
-    ----------
-    row : StationRow
-        Names, place and ground of the station.
-    event : dict
-        ``time`` (UTC), ``latitude``, ``longitude`` (degrees), ``depth`` (m) and ``magnitude``, as
-        far as they are known.
-    """
-
+    #: names, place and ground of the station
     row: StationRow
+    #: time (UTC), latitude, longitude (degrees), depth (m) and magnitude, as far as known
     event: Words
 
 
@@ -66,19 +58,9 @@ def is_itaca_metadata(start: bytes) -> bool:
 
 def read_itaca_metadata(name: str, content: bytes) -> ItacaMetadata:
     """
-    Read a metadata file.
+    Read a metadata file in UTF-8 or Latin-1; the name is for messages.
 
-    Parameters
-    ----------
-    name : str
-        File, for messages.
-    content : bytes
-        UTF-8 or Latin-1.
-
-    Raises
-    ------
-    RecordRejected
-        If it does not hold one line of values, or the station has no code or place.
+    It is refused if it does not hold one line of values, or the station has no code or place.
     """
     fields = _fields(name, content.decode("utf-8", "replace"))
     numbers = {

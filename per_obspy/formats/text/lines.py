@@ -173,19 +173,12 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
 
     Parameters
     ----------
-    text : Text
-        The file.
-    start : int
-        Line of the first number.
+    text, start
+        The file, and the line of the first number.
     samples : int
         Numbers of the block, dimensionless.
     width, per_line : int
         Characters of a number, numbers of a full line.
-
-    Returns
-    -------
-    samples : (samples,) ndarray
-        In the unit of the file.
     """
     full = width * per_line
     if width > LONGEST_NUMBER or full > LONGEST_LINE:
@@ -258,19 +251,7 @@ def free_block(text: Text, start: int, samples: int) -> FloatArray:
     """
     Read numbers separated by white space from a line to the end of the file.
 
-    Parameters
-    ----------
-    text : Text
-        The file.
-    start : int
-        Line of the first number.
-    samples : int
-        Numbers that the header promises, dimensionless.
-
-    Returns
-    -------
-    samples : (n_samples,) ndarray
-        In the unit of the file.
+    There must be as many as the header promises.
     """
     rows = text.lines[start:]
     content = "\n".join(rows).encode("latin-1")

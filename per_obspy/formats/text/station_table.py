@@ -38,34 +38,22 @@ SOURCE = "coordinates from "
 
 
 class StationRow(NamedTuple):
-    """
-    One row of a table of stations.
+    """One row of a table of stations."""
 
-    Attributes
-    ----------
-    network : str
-        Code in capitals; empty where the table has none, which fits any.
-    names : tuple of str
-        Code and name, as :func:`bare_name` gives them.
-    latitude, longitude : float
-        Degrees.
-    elevation : float or None
-        m.
-    vs30 : float or None
-        Mean shear-wave velocity of the upper 30 m, m/s.
-    site_class : str
-        Any word; empty if unknown.
-    source : str
-        Name of the table.
-    """
-
+    #: code in capitals; empty where the table has none, which fits any
     network: str
+    #: code and name, as :func:`bare_name` gives them
     names: tuple[str, ...]
+    #: degrees
     latitude: float
     longitude: float
+    #: m
     elevation: float | None
+    #: mean shear-wave velocity of the upper 30 m, m/s
     vs30: float | None = None
+    #: any word; empty if unknown
     site_class: str = ""
+    #: name of the table
     source: str = ""
 
 
@@ -97,17 +85,7 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
     """
     Read a table of stations: comma or semicolon between columns, names of columns in any case.
 
-    Parameters
-    ----------
-    name : str
-        File, for messages.
-    content : bytes
-        UTF-8 or Latin-1.
-
-    Raises
-    ------
-    RecordRejected
-        Naming line and column of the first fault.
+    The content is UTF-8 or Latin-1. `RecordRejected` names line and column of the first fault.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -188,14 +166,9 @@ def number_within(
 
 def located_stations(rows: Iterable[StationRow], stations: Iterable[str]) -> Inventory:
     """
-    Return the coordinates of stations that have records.
+    Return the coordinates of stations that have records, ``"NET.STA"``, from rows of all tables.
 
-    Parameters
-    ----------
-    rows : iterable of StationRow
-        Of all tables.
-    stations : iterable of str
-        ``"NET.STA"``; code or name in a table may be in any case.
+    Code or name in a table may be in any case.
     """
     table = tuple(rows)
     networks = []

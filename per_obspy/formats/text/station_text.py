@@ -29,71 +29,40 @@ _OPEN = UTCDateTime(1, 1, 2)
 
 
 class StationLine(NamedTuple):
-    """
-    One channel or station of a list.
+    """One channel or station of a list."""
 
-    Attributes
-    ----------
-    number : int
-        Of the line; the header is line 1.
-    network, station, location, channel : str
-        Codes; location and channel are empty in a list of stations.
-    latitude, longitude : float
-        Degrees.
-    start, end : UTCDateTime or None
-        Of the epoch; None where it is open.
-    """
-
+    #: of the line; the header is line 1
     number: int
+    #: codes; location and channel are empty in a list of stations
     network: str
     station: str
     location: str
     channel: str
+    #: degrees
     latitude: float
     longitude: float
+    #: of the epoch; None where it is open
     start: UTCDateTime | None
     end: UTCDateTime | None
 
 
 class LineFault(NamedTuple):
-    """
-    A line that cannot be used.
-
-    Attributes
-    ----------
-    number : int
-    name : str
-        Codes in it, as far as they can be read.
-    reason : str
-        Column, value and expectation.
-    """
+    """A line that cannot be used."""
 
     number: int
+    #: codes in it, as far as they can be read
     name: str
+    #: column, value and expectation
     reason: str
 
 
 def station_lines(content: bytes) -> tuple[list[StationLine], list[LineFault]]:
     r"""
-    Read every line of FDSN station text alone.
+    Read every line of FDSN station text alone: the usable lines, and the faults of the others.
 
-    Only codes, place and epoch are read: a fault in another column is none here.
-
-    Parameters
-    ----------
-    content : bytes
-        Answer of a station service to ``format=text``, or a file of it. A byte that is no UTF-8 is
-        a fault only where a code, place or time has it.
-
-    Returns
-    -------
-    lines : list of StationLine
-    faults : list of LineFault
-
-    Raises
-    ------
-    ValueError
-        If the first line does not name the columns.
+    Only codes, place and epoch are read: a fault in another column is none here. A byte that is no
+    UTF-8 is a fault only where a code, place or time has it. If the first line does not name the
+    columns, ``ValueError``.
 
     Examples
     --------

@@ -225,21 +225,11 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any], file: str = 
     """
     Return a trace with the words of the vocabulary, which is acceleration in m/s2 by default.
 
-    Words that are None are left out, and so are empty groups. The channel code is made from rate
-    and orientation where the header has none. Codes keep letters, digits, ``_`` and ``-`` only, so
-    that they can name a file. The peak of the header loses its sign.
-
-    Parameters
-    ----------
-    samples : (n_samples,) ndarray
-        In ``words["units"]``.
-    dt : float
-        Sampling interval, s.
-    words : mapping
-        From the header; ``notes`` and the ``problem`` of the coordinates become lines of
-        ``processing``.
-    file : str, optional
-        Name of a file of one component, whose end may be a direction.
+    Words that are None are left out, and so are empty groups; ``notes`` and the ``problem`` of the
+    coordinates become lines of ``processing``. The channel code is made from rate and orientation
+    where the header has none, with the end of the name of a file of one component. Codes keep
+    letters, digits, ``_`` and ``-`` only, so that they can name a file. The peak of the header
+    loses its sign. Samples are in ``words["units"]``, their interval in s.
     """
     header: Words = {"units": "m/s2", "quantity": "acceleration", **words}
     # Notes of the reader and of the place
@@ -276,16 +266,9 @@ def gal_columns(
     table: FloatArray, dt: float, words: Mapping[str, Any], components: Iterable[Mapping[str, Any]]
 ) -> Stream:
     """
-    Return the components of a table as traces.
+    Return the components of a table (n_samples, n_components), gal, as traces at an interval, s.
 
-    Parameters
-    ----------
-    table : (n_samples, n_components) ndarray
-        gal.
-    dt : float
-        Sampling interval, s.
-    words, components : mapping, iterable of mapping
-        Words of all components, and of each.
+    The first words are those of all components, the others those of each.
     """
     columns = zip(GAL * table.T, components, strict=True)
     return Stream([trace(column, dt, {**words, **component}) for column, component in columns])

@@ -81,27 +81,11 @@ def titled_block(
     text: Text, line: int, kind: str, per_line: int, width: int
 ) -> tuple[FloatArray, float, int]:
     """
-    Read a block of samples below its title.
+    Read a block of samples below its title, which must hold a word in capitals.
 
-    Parameters
-    ----------
-    text : Text
-        The file.
-    line : int
-        Line of the title.
-    kind : str
-        A word that the title must hold, in capitals.
-    per_line, width : int
-        Numbers of a full line, characters of a number: where the title has no FORTRAN format.
-
-    Returns
-    -------
-    samples : (n_samples,) ndarray
-        In the unit of the file.
-    dt : float
-        Sampling interval, s.
-    next_line : int
-        Line after the block.
+    The title may have a FORTRAN format; else ``per_line`` numbers of a full line have ``width``
+    characters each. Return the samples in the unit of the file, their interval, s, and the line
+    after the block.
     """
     name = f"title of {kind.lower() or 'samples'}"
     title = line_at(text, line, name).upper()
@@ -138,24 +122,15 @@ def corrected_blocks(
 
 
 class Film(NamedTuple):
-    """
-    A digitised trace on even steps.
+    """A digitised trace on even steps."""
 
-    Attributes
-    ----------
-    values : (n_samples,) ndarray
-        In the unit of the file.
-    dt : float
-        Interval, s.
-    words : dict
-        ``digitised`` and ``notes`` in the vocabulary of ``formats/text/vocabulary.py``.
-    next_line : int
-        Line after the film.
-    """
-
+    #: in the unit of the file
     values: FloatArray
+    #: interval, s
     dt: float
+    #: ``digitised`` and ``notes``
     words: Words
+    #: line after the film
     next_line: int
 
 
@@ -163,18 +138,9 @@ def read_film(
     text: Text, line: int, samples: int, width: int = _WIDTH, per_line: int = _PAIRS_PER_LINE
 ) -> Film:
     """
-    Read a digitised trace as :func:`even_film` gives it.
+    Read a digitised trace as :func:`even_film` gives it, from the line of the first time on.
 
-    Parameters
-    ----------
-    text : Text
-        The file.
-    line : int
-        Line of the first time.
-    samples : int
-        Pairs of time and value, dimensionless.
-    width, per_line : int
-        Characters of a number, pairs of a full line.
+    It has so many pairs of time and value, of ``width`` characters a number.
     """
     pairs = fixed_block(text, line, 2 * samples, width, 2 * per_line).reshape(-1, 2)
     return even_film(text, line, pairs, per_line)
@@ -182,23 +148,14 @@ def read_film(
 
 def even_film(text: Text, line: int, pairs: FloatArray, per_line: int) -> Film:
     """
-    Return digitised times and values on even steps.
+    Return digitised times, s, and values, (n_samples, 2), on even steps.
 
     The times are rounded and corrected for the speed of the film, a sample or two may be missing
     where two pictures join, and some operators digitised turning points only. Where every time is
     within half a mean interval of its even place, the values are kept and have the mean interval.
     Otherwise they are interpolated linearly onto steps of 0.02, 0.01, 0.005 ... s, the first that
     is not longer than the mean interval. A time that does not grow is left out and noted; a hole
-    in the record or many such times are refused.
-
-    Parameters
-    ----------
-    text, line
-        File and line of the first time, for messages.
-    pairs : (n_samples, 2) ndarray
-        Times, s, and values.
-    per_line : int
-        Pairs on a line, dimensionless.
+    in the record or many such times are refused, by their line.
     """
     places = _rising_times(text, line, pairs[:, 0], per_line)
     times, values = pairs[places].T
