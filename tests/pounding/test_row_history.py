@@ -296,28 +296,6 @@ class TestEndOfRecord:
 
 
 class TestBadInput:
-    @pytest.mark.parametrize(
-        ("name", "change"),
-        [
-            ("restitution", {"restitution": 1.1}),
-            ("gaps", {"gaps": -0.1}),
-            ("gaps", {"gaps": [0.1, 0.2]}),
-            ("structures", {"structures": [Structure(1.0, 0.05, 1.0)]}),
-            ("dt", {"dt": 0.0}),
-            ("acceleration", {"acceleration": [0.0, np.nan]}),
-        ],
-    )
-    def test_names_the_argument(self, name, change):
-        arguments = {
-            "acceleration": shaking(1.0),
-            "dt": DT,
-            "structures": pair(*PAIRS[0][:2]),
-            "gaps": 0.1,
-            "restitution": 0.5,
-        }
-        with pytest.raises(ValueError, match=name):
-            pounding_history(**{**arguments, **change})
-
     def test_two_walls(self):
         wall = Structure(1.0, 0.05, np.inf, participation=0.0)
         with pytest.raises(ValueError, match="infinite"):
