@@ -351,8 +351,7 @@ def linearized_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.kernel_tables import both_components
-    from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0), Structure(1.2, 0.05, 1.0)
     >>> linear = linearized_correlation(*pair, WhiteNoise(0.01))
     >>> print(round(linear.recommended, 6), linear.gauss_3.converged)
@@ -414,8 +413,7 @@ def ductility_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.kernel_tables import both_components
-    from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0, hardening=0.05), Structure(1.2, 0.05, 1.0, hardening=0.05)
     >>> print(ductility_correlation(*pair, 4.0, 4.0, WhiteNoise(0.01)).correlation > 0.5)
     True
