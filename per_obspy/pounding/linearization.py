@@ -471,18 +471,10 @@ def davenport_peak_factor(frequency: float, duration: float) -> float:
 
 def bandwidth(ground: StochasticGround) -> float:
     """
-    Compute the Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
+    Return the Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
 
-    Parameters
-    ----------
-    ground : WhiteNoise, KanaiTajimi or CloughPenzien
-        Its intensity does not matter.
-
-    Returns
-    -------
-    bandwidth : float
-        ``sqrt(1 - λ1²/(λ0 λ2))`` of the spectral moments over the band with 95 % of the power below
-        25 Hz.
+    ``sqrt(1 - λ1²/(λ0 λ2))`` of the spectral moments over the band with 95 % of the power below 25
+    Hz; the intensity does not matter.
     """
     frequency = np.linspace(0.0, LARGEST_FREQUENCY, 20001)
     return _bandwidth(frequency, ground.psd(frequency))
@@ -490,25 +482,10 @@ def bandwidth(ground: StochasticGround) -> float:
 
 def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
     """
-    Compute the Vanmarcke bandwidth of a record, from the power of both components together.
+    Return the Vanmarcke bandwidth of a record, from the power of both components together.
 
-    Parameters
-    ----------
-    north, east : (n_samples,) array_like
-        Ground acceleration, m/s²; the sum of their powers is that of any two directions at right
-        angles.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    bandwidth : float
-        As :func:`bandwidth`; 1 without motion.
-
-    Raises
-    ------
-    ValueError
-        If a component is no record or the interval is not positive.
+    North and east (n_samples) are in m/s², dt in s; the sum of their powers is that of any two
+    directions at right angles. 1 without motion.
     """
     motion = both_components(north, east)
     power: FloatArray = (np.abs(np.fft.rfft(motion)) ** 2).sum(axis=0)
