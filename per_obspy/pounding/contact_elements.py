@@ -1,6 +1,7 @@
 """Histories of two structures joined by a link, or separated by a Kelvin-Voigt or Hertz contact."""
 
 import math
+from collections.abc import Sequence
 from itertools import repeat
 from typing import Any, NamedTuple
 
@@ -354,21 +355,22 @@ def hertz_damp_history(
     stiffness = checks.number("stiffness", stiffness, checks.positive)
     lost = 0.75 * (1.0 - checks.between("restitution", restitution, 0.0, 1.0) ** 2)
     refuse_bilinear(structures := (structure_1, structure_2))
+    table = structure_table(structures).tolist()
 
     # Samples at which the motion is returned
     times = step * np.arange(record.size, dtype=np.float64)
-    return _integrate(_HertzPair(structures, gap, stiffness, float(lost), step, times, record))
+    return _integrate(_HertzPair(table, gap, stiffness, float(lost), step, times, record))
 
 
 class _HertzPair(NamedTuple):
     """
     Two structures, their contact, and ground acceleration (m/s²) at times of interval dt (s).
 
-    Gap (m), stiffness (N/m^1.5) and ``lost``, the factor 3 (1 - e²)/4 of the damping. An approach
-    speed of 0 means that the structures are apart.
+    ``table`` is that of the kernels; gap (m), stiffness (N/m^1.5), and ``lost``, the factor 3 (1 -
+    e²)/4 of the damping. An approach speed of 0 means that the structures are apart.
     """
 
-    structures: tuple[Structure, Structure]
+    table: list[list[float]]
     gap: float
     stiffness: float
     lost: float
@@ -376,7 +378,7 @@ class _HertzPair(NamedTuple):
     times: FloatArray
     acceleration: FloatArray
 
-    def force(self, state: FloatArray, approach: float) -> float:
+    def force(self, state: Sequence[float], approach: float) -> float:
         """Return the contact force, N."""
         overlap, rate = state[0] - state[2] - self.gap, state[1] - state[3]
         if approach == 0.0 or overlap <= 0.0:
@@ -385,14 +387,17 @@ class _HertzPair(NamedTuple):
 
     def rates(self, time: float, state: FloatArray, approach: float) -> list[float]:
         """Return the rates of change of displacement and velocity of both structures."""
-        force, rates = self.force(state, approach), []
+        # Numbers of Python: those of NumPy one by one take several times as long
+        now = state.tolist()
+        force, rates = self.force(now, approach), []
         ground = float(np.interp(time, self.times, self.acceleration))
 
         # The contact pushes structure 1 back and structure 2 on
-        for i, (one, push) in enumerate(zip(self.structures, (-force, force), strict=True)):
-            displacement, velocity = state[2 * i : 2 * i + 2]
-            own = 2.0 * one.damping * one.frequency * velocity + one.frequency**2 * displacement
-            rates += [velocity, push / one.mass - own - one.participation * ground]
+        for i, push in ((0, -force), (1, force)):
+            displacement, velocity = now[2 * i : 2 * i + 2]
+            damping_rate, stiffness, _, _, participation, mass = self.table[i]
+            own = 2.0 * damping_rate * velocity + stiffness * displacement
+            rates += [velocity, push / mass - own - participation * ground]
         return rates
 
     def stretch(self, start: float, state: FloatArray, approach: float) -> Any:

@@ -140,24 +140,9 @@ def transfer_energies(
 
 def mass_shares(mass_1: ArrayLike, mass_2: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Compute the shares of two masses in their sum, and the reduced mass.
+    Return ``m1/(m1 + m2)``, ``m2/(m1 + m2)`` and the reduced mass ``m1 m2/(m1 + m2)`` (kg).
 
-    Parameters
-    ----------
-    mass_1, mass_2 : array_like
-        Impact masses, kg; one of the two may be infinite.
-
-    Returns
-    -------
-    share_1, share_2 : ndarray
-        ``m1/(m1 + m2)`` and ``m2/(m1 + m2)``, dimensionless.
-    reduced_mass : ndarray
-        ``m1 m2/(m1 + m2)``, kg.
-
-    Raises
-    ------
-    ValueError
-        If a mass is not positive or both are infinite.
+    Masses are checked: above zero, and one of the two may be infinite.
     """
     mass_1 = checks.positive_or_infinite("mass_1", mass_1)
     mass_2 = checks.positive_or_infinite("mass_2", mass_2)

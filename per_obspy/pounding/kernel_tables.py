@@ -294,32 +294,11 @@ def run_blocks(
     """
     Carry all pairs through a record and the free vibration after it, in blocks on all processors.
 
-    Parameters
-    ----------
-    kernel : callable
-        ``run_block`` or ``run_without_contact``.
-    lane_rows : int
-        Rows of its lanes.
-    components : (2, n_samples) ndarray
-        North and east acceleration, m/s².
-    dt : float
-        Sampling interval, s.
-    rows : (n_pairs, 2, ROW_COLUMNS) ndarray
-        Of the pairs at rest; then at the end.
-    parts, free_steps : (n_pairs,) ndarray of int
-        Steps of a sampling interval, and sampling intervals of free vibration at most.
-    azimuth : (n_pairs,) ndarray
-        Of the axis from 1 to 2, rad.
-
-    Returns
-    -------
-    (n_pairs,) ndarray of int
-        Impacts that count, see `count_impacts`.
-
-    Raises
-    ------
-    RuntimeError
-        If a step has more events than any record causes.
+    By ``run_block`` or ``run_without_contact``, whose lanes have ``lane_rows``. The components (2,
+    n_samples) are in m/s², dt in s; ``rows`` (n_pairs, 2, ROW_COLUMNS) are at rest, then at the
+    end. Each pair has its steps of a sampling interval, sampling intervals of free vibration at
+    most, and azimuth (rad). Return impacts that count (`count_impacts`); ``RuntimeError`` if a step
+    has more events than any record causes.
     """
     counts = np.zeros(len(rows), dtype=np.int64)
     records = records_in_steps(components, parts, dt)

@@ -351,8 +351,7 @@ def linearized_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.kernel_tables import both_components
-    from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0), Structure(1.2, 0.05, 1.0)
     >>> linear = linearized_correlation(*pair, WhiteNoise(0.01))
     >>> print(round(linear.recommended, 6), linear.gauss_3.converged)
@@ -414,8 +413,7 @@ def ductility_correlation(
 
     Examples
     --------
-    >>> from per_obspy.pounding.kernel_tables import both_components
-    from per_obspy.pounding.stationary_ground import WhiteNoise
+    >>> from per_obspy.pounding.stationary_ground import WhiteNoise
     >>> pair = Structure(1.0, 0.05, 1.0, hardening=0.05), Structure(1.2, 0.05, 1.0, hardening=0.05)
     >>> print(ductility_correlation(*pair, 4.0, 4.0, WhiteNoise(0.01)).correlation > 0.5)
     True
@@ -473,18 +471,10 @@ def davenport_peak_factor(frequency: float, duration: float) -> float:
 
 def bandwidth(ground: StochasticGround) -> float:
     """
-    Compute the Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
+    Return the Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
 
-    Parameters
-    ----------
-    ground : WhiteNoise, KanaiTajimi or CloughPenzien
-        Its intensity does not matter.
-
-    Returns
-    -------
-    bandwidth : float
-        ``sqrt(1 - λ1²/(λ0 λ2))`` of the spectral moments over the band with 95 % of the power below
-        25 Hz.
+    ``sqrt(1 - λ1²/(λ0 λ2))`` of the spectral moments over the band with 95 % of the power below 25
+    Hz; the intensity does not matter.
     """
     frequency = np.linspace(0.0, LARGEST_FREQUENCY, 20001)
     return _bandwidth(frequency, ground.psd(frequency))
@@ -492,25 +482,10 @@ def bandwidth(ground: StochasticGround) -> float:
 
 def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
     """
-    Compute the Vanmarcke bandwidth of a record, from the power of both components together.
+    Return the Vanmarcke bandwidth of a record, from the power of both components together.
 
-    Parameters
-    ----------
-    north, east : (n_samples,) array_like
-        Ground acceleration, m/s²; the sum of their powers is that of any two directions at right
-        angles.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    bandwidth : float
-        As :func:`bandwidth`; 1 without motion.
-
-    Raises
-    ------
-    ValueError
-        If a component is no record or the interval is not positive.
+    North and east (n_samples) are in m/s², dt in s; the sum of their powers is that of any two
+    directions at right angles. 1 without motion.
     """
     motion = both_components(north, east)
     power: FloatArray = (np.abs(np.fft.rfft(motion)) ** 2).sum(axis=0)

@@ -205,18 +205,9 @@ def _spectra(
 
 def amplifications(compared: SingleHitComparison) -> tuple[FloatArray, FloatArray]:
     """
-    Compute the largest amplification of either structure of the pairs with a single hit.
+    Return the predicted and actual amplification of the structure that is amplified most.
 
-    Parameters
-    ----------
-    compared : SingleHitComparison
-        From :func:`compare_single_hit`.
-
-    Returns
-    -------
-    predicted, actual : (n_ok,) ndarray
-        Radius with pounding over radius without, of the structure that is amplified most,
-        dimensionless.
+    Radius with pounding over radius without, of each pair with a single hit, (n_ok,) each.
     """
     known = compared.status == "ok"
     per = compared.per[:, known]

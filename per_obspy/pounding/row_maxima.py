@@ -93,32 +93,11 @@ def run_row_blocks(
     """
     Carry all rows through a record and the free vibration after it, on all processors.
 
-    Parameters
-    ----------
-    ground : (2, n_samples) ndarray
-        North and east acceleration, m/s².
-    dt : float
-        Sampling interval, s.
-    first : (n_rows + 1,) ndarray of int
-        First building of each row, then the number of buildings.
-    lines : (n_buildings, ROW_COLUMNS) ndarray
-        Buildings at rest; then at the end.
-    parts, free_steps : (n_rows,) ndarray of int
-        Steps of a sampling interval, and sampling intervals of free vibration at most.
-    azimuth : (n_rows,) ndarray
-        Of the axis of each row, rad.
-    scale : (n_buildings,) ndarray
-        Of the clearance after each building, see `row_scales`.
-
-    Returns
-    -------
-    (n_buildings,) ndarray of int
-        Impacts that count, see `count_row_impacts`.
-
-    Raises
-    ------
-    RuntimeError
-        If a step has more events than any record causes.
+    The ground (2, n_samples) is in m/s², dt in s; ``lines`` (n_buildings, ROW_COLUMNS) are at rest,
+    then at the end, those of a row from its ``first`` on. Each row has its steps of a sampling
+    interval, sampling intervals of free vibration at most, and azimuth (rad); ``scale`` is that of
+    the clearance after each building (`row_scales`). Return impacts that count after each building
+    (`count_row_impacts`); ``RuntimeError`` if a step has more events than any record causes.
     """
     # Rows of two are pairs, of which a block has more
     counts, sizes = _run_pairs(ground, dt, first, lines, parts, free_steps, azimuth), np.diff(first)

@@ -208,24 +208,12 @@ def run_in_parts(
     """
     Compute the maxima of rows by their parts, and those of pairs of neighbours alone.
 
-    A part of two buildings is a pair alone, and is computed once for both.
-
-    Parameters
-    ----------
-    rows : BuildingRows
-        Checked.
-    maxima : (n_buildings, n_maxima) ndarray
-        Maxima of every building alone, its displacement first; then those in its row.
-    run : callable
-        Return the maxima of checked rows of two buildings and more.
-    with_pairs : bool
-        Whether pairs of longer parts are computed too.
-
-    Returns
-    -------
-    (n_buildings, 2, n_maxima) ndarray
-        Maxima of each building and the next one without the others of their row: without contact
-        where their gap stays open, and where the pair is not computed.
+    ``maxima`` (n_buildings, n_maxima) are those of every building alone, its displacement first;
+    then those in its row. ``run`` returns the maxima of checked rows of two buildings and more. A
+    part of two buildings is a pair alone, and is computed once for both; pairs of longer parts only
+    ``with_pairs``. Return the maxima of each building and the next one without the others of their
+    row, (n_buildings, 2, n_maxima): without contact where their gap stays open, and where the pair
+    is not computed.
     """
     is_end = stays_open(rows, maxima[:, 0])
     number = _counted(is_end, np.ones_like(is_end))

@@ -107,10 +107,11 @@ def supplemental_damping(
         """Return the critical gap for each added damping, m."""
         xi_1, xi_2 = damping_1 + share_1 * added, damping_2 + share_2 * added
 
-        # Equation (15) with the radii, equation (16) for their correlation
+        # Equation (16) for the correlation, equation (15) with the radii
+        correlation = ddc_correlation(period_1, xi_1, period_2, xi_2)
         per_1 = per_spectrum(acceleration, dt, [period_1], xi_1)[:, 0]
         per_2 = per_spectrum(acceleration, dt, [period_2], xi_2)[:, 0]
-        return critical_gap(per_1, per_2, ddc_correlation(period_1, xi_1, period_2, xi_2))
+        return critical_gap(per_1, per_2, correlation)
 
     # Scan the added damping, and refine before the first that is enough
     return _least(critical_gaps, gap, largest)

@@ -129,19 +129,3 @@ def test_contact_time_decides_whether_the_impact_is_instant():
     )
     assert list(found.instant) == [True, False]
     assert np.all(found.restitution == 1.0)
-
-
-@pytest.mark.parametrize(("name", "call"), [
-    ("target", lambda: required_restitution(1, 1, 1, 1, 1, 1, 1, 0.5, 0.9)),
-    ("gap", lambda: required_restitution(1, 1, 1, 1, 1, 1, 1, -0.5, 1.9)),
-    ("damping", lambda: kelvin_voigt_restitution(1.0)),
-    ("restitution", lambda: kelvin_voigt_damping(1.1)),
-    ("restitution", lambda: jankowski_damping(0.0)),
-    ("restitution", lambda: mahmoud_jankowski_damping(-0.1)),
-    ("viscosity", lambda: bumper_restitution(1.0, 10.0, 1.0, 1.0, 1.0)),
-    ("stiffness", lambda: bumper_restitution(0.0, 10.0, 1.0, 1.0, 1.0)),
-    ("shortest_period", lambda: bumper_restitution(1.0, 0.1, 1.0, 1.0, 0.0)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, call):
-    with pytest.raises(ValueError, match=name):
-        call()

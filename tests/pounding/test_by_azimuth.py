@@ -106,15 +106,6 @@ def test_results_do_not_depend_on_the_company(pairs):
     assert_array_equal(together, alone)
 
 
-@pytest.mark.parametrize(("east", "damping_1", "message"), [
-    (EAST[1:], 0.05, "north and east must be equally long, got 1500 and 1499"),
-    (EAST, 5.0, "damping_1 must be at least 0 and below 1, got 5"),
-])  # fmt: skip
-def test_bad_arguments_are_named(east, damping_1, message):
-    with pytest.raises(ValueError, match=message):
-        directional_correlation(NORTH, east, DT, [1.0], [damping_1], [1.0], [0.05], [[0.0]])
-
-
 def test_an_azimuth_without_motion_has_no_correlation():
     with pytest.raises(ValueError, match="no motion along an azimuth"):
         directional_correlation(0 * NORTH, EAST, DT, [1.0], [0.05], [1.2], [0.05], [[0.0]])

@@ -106,17 +106,3 @@ def test_a_fine_table_of_a_ground_is_that_ground():
         assert found == pytest.approx(
             ground_correlation(LAKEBED, *pair), abs=1e-5
         )  # (5e-3 rad/s over the peak's 0.3)²/12
-
-
-@pytest.mark.parametrize(("name", "call"), [
-    ("intensity", lambda: WhiteNoise(0.0)), ("damping", lambda: KanaiTajimi(1.0, -0.1, 1.0)),
-    ("low_frequency", lambda: CloughPenzien(1.0, 0.1, 0.0, 0.6, 1.0)),
-    ("frequencies must increase", lambda: psd_correlation([1, 1], [1, 1], 1, 0.1, 1, 0.1)),
-    ("psd is 0", lambda: psd_correlation([0, 0], [0, 1], 1, 0.1, 1, 0.1)),
-    ("equal length", lambda: psd_correlation([1, 1, 1], [0, 1], 1, 0.1, 1, 0.1)),
-    ("damping_1", lambda: psd_correlation([1, 1], [0, 1], 1, 0.0, 1, 0.1)),
-    ("damping_2", lambda: ground_correlation(WHITE, 1, 0.1, 1, 0.0)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, call):
-    with pytest.raises(ValueError, match=name):
-        call()

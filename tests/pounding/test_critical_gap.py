@@ -69,11 +69,3 @@ def test_broadcasting_and_plain_rules():
     assert critical_gap([[1.0], [2.0]], [1.0, 2.0, 3.0], 0.5).shape == (2, 3)
     assert srss_gap(5.0, 12.0) == 13.0
     assert absolute_gap(5.0, 12.0) == 17.0
-
-
-@pytest.mark.parametrize(("name", "arguments"), [
-    ("per_1", (-1.0, 1.0, 0.0)), ("per_2", (1.0, np.inf, 0.0)), ("correlation", (1.0, 1.0, 1.5)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, arguments):
-    with pytest.raises(ValueError, match=name):
-        critical_gap(*arguments)

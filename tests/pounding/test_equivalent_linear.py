@@ -76,14 +76,3 @@ def test_unverified_coefficients_say_so():
         assert isinstance(found, UnverifiedEquivalentLinear)
         assert "Unverified" in repr(found)
     assert "Unverified" not in repr(equivalent_linear("iwan", 2.0, 1.0, 0.05, 0.0))
-
-
-@pytest.mark.parametrize(("name", "arguments"), [
-    ("method", ("jeng", 2.0, 1.0, 0.05, 0.0)), ("ductility", ("iwan", -1.0, 1.0, 0.05, 0.0)),
-    ("period", ("iwan", 2.0, 0.0, 0.05, 0.0)), ("damping", ("iwan", 2.0, 1.0, 1.0, 0.0)),
-    ("hardening", ("iwan", 2.0, 1.0, 0.05, 1.0)),
-    ("damping of", ("jeng_unverified", 12.0, 1.0, 0.05, 0.0)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, arguments):
-    with pytest.raises(ValueError, match=name):
-        equivalent_linear(*arguments)

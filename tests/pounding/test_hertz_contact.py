@@ -1,7 +1,6 @@
 """Hertz-damp contact: exact without contact, elastic impacts of stiff ones, loss of energy."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.pounding.contact_elements import hertz_damp_history
@@ -47,12 +46,3 @@ def test_damping_loses_energy():
     after = int(exact.impacts["time"][0] / DT) + 2
     separation = [h.velocity[1, after] - h.velocity[0, after] for h in (lossy, elastic)]
     assert 0.0 < separation[0] < 0.9 * separation[1]
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("gap", 0.0), ("stiffness", -1.0), ("restitution", 1.2)]
-)
-def test_names_the_argument(name, value):
-    arguments = {"gap": 0.1, "stiffness": 1e5, "restitution": 0.5, name: value}
-    with pytest.raises(ValueError, match=name):
-        hertz_damp_history(push(), DT, LEFT, RIGHT, **arguments)

@@ -147,15 +147,6 @@ def test_davenport_peak_factor():
         davenport_peak_factor(2 * np.pi, 0.5)
 
 
-@pytest.mark.parametrize(("name", "call"), [
-    ("damping", lambda: linearized_correlation(Structure(1, 0, 1), DAMPED, WHITE)),
-    ("ductility_2", lambda: ductility_correlation(DAMPED, DAMPED, 2.0, 0.0, WHITE)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, call):
-    with pytest.raises(ValueError, match=name):
-        call()
-
-
 class TestBandwidthOfARecord:
     def test_white_noise_has_that_of_a_flat_spectrum(self):
         # moments of a flat spectrum from 0 on: sqrt(1 - (1/2)² / (1/3)) = 1/2; 20 000 samples

@@ -244,18 +244,6 @@ class TestAzimuth:
 
 
 class TestBadInput:
-    @pytest.mark.parametrize(
-        ("name", "value"),
-        [
-            ("period_1", 0.0), ("damping_2", 1.0), ("mass_1", -1.0), ("gap", -0.1), ("gap", np.nan),
-            ("restitution", 1.5), ("hardening_1", 1.0), ("yield_displacement_2", 0.0),
-            ("participation_1", -1.0),
-        ],
-    )  # fmt: skip
-    def test_names_the_argument(self, name, value):
-        with pytest.raises(ValueError, match=name):
-            pounding_histories(shaking(1.0), DT, **{**pairs(2), name: value})
-
     def test_azimuth_and_components_go_together(self):
         with pytest.raises(ValueError, match="azimuth"):
             pounding_histories(shaking(1.0), DT, **pairs(2), azimuth=10.0)

@@ -1,10 +1,9 @@
-"""Probability of pounding: Monte Carlo, SciPy's integration, limits, monotony."""
+"""Probability of pounding: Monte Carlo, integration over the plane, limits, monotony."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import dblquad
 from scipy.stats import norm
 
 from per_obspy.pounding.critical_gap import critical_gap
@@ -51,19 +50,18 @@ def test_against_monte_carlo(case):
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[5]])
 def test_against_integration_over_both_radii(case):
-    # mutation: anything in the reduction to one dimension. SciPy integrates over the plane of ln r1
-    # and ln r2
+    # mutation: anything in the reduction to one dimension. The trapezoidal rule over the plane of
+    # ln r1 and ln r2 converges exponentially, because the integrand is smooth and ends at zero
     r1, r2, rho, gap, b1, b2, shared, model, spread = case
-    rest = np.hypot(model, spread)
+    line = np.linspace(-7.5, 7.5, 1501)  # beyond 7.5: 1e-13
+    x, y = np.meshgrid(line, line, sparse=True)
 
-    def integrand(y, x):
-        # x moves both radii, y only what structure 2 does not share
-        first = r1 * np.exp(b1 * x)
-        second = r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y))
-        demand = np.sqrt(first**2 + second**2 - 2 * rho * first * second)
-        return norm.pdf(x) * norm.pdf(y) * norm.cdf(np.log(demand / gap) / rest)
-
-    expected = dblquad(integrand, -7, 7, -7, 7, epsabs=1e-8, epsrel=1e-8)[0]  # beyond 7: 1e-12
+    # x moves both radii, y only what structure 2 does not share
+    first = r1 * np.exp(b1 * x)
+    second = r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y))
+    demand = np.sqrt(first**2 + second**2 - 2 * rho * first * second)
+    chance = norm.cdf(np.log(demand / gap) / np.hypot(model, spread))
+    expected = np.sum(norm.pdf(x) * norm.pdf(y) * chance) * 0.01**2
     assert pounding_probability(*case) == pytest.approx(expected, abs=1e-7)
 
 
@@ -138,16 +136,3 @@ def test_first_order_is_close_only_for_unlike_radii():
     unlike, alike = CASES[0], (0.2, 0.2, 0.99, 0.0285, 0.4, 0.4, 0.5, 0.0, 0.0)
     assert first_order_probability(unlike) == pytest.approx(pounding_probability(*unlike), abs=0.05)
     assert first_order_probability(alike) < pounding_probability(*alike) - 0.3
-
-
-@pytest.mark.parametrize(("place", "value", "name"), [
-    (0, -1.0, "per_1"), (1, np.nan, "per_2"), (2, 1.1, "correlation"), (3, -0.1, "gap"),
-    (4, -0.1, "dispersion_1"), (5, np.inf, "dispersion_2"), (6, 1.2, "dispersion_correlation"),
-    (7, -1.0, "model_dispersion"),
-    (8, -1.0, "gap_dispersion"),
-])  # fmt: skip
-def test_bad_arguments_are_named(place, value, name):
-    arguments = list(CASES[0])
-    arguments[place] = value
-    with pytest.raises(ValueError, match=name):
-        pounding_probability(*arguments)

@@ -193,26 +193,3 @@ def test_the_exact_history_first_touches_at_the_largest_relative_displacement():
     )
     assert np.all(apart == 0.0)
     assert np.all(touching > 0.0)
-
-
-@pytest.mark.parametrize(("name", "changed"), [
-    ("acceleration", {"acceleration": [0.0, np.nan]}), ("dt", {"dt": 0.0}),
-    ("period_1", {"period_1": -1.0}), ("damping_2", {"damping_2": 1.0}),
-    ("participation_1", {"participation_1": -1.0}),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, changed):
-    arguments = {
-        "acceleration": [0.0, 1.0],
-        "dt": 0.01,
-        "period_1": 1.0,
-        "damping_1": 0.05,
-        "period_2": 2.0,
-        "damping_2": 0.05,
-    }
-    with pytest.raises(ValueError, match=name):
-        relative_displacement(**arguments | changed)
-
-
-def test_components_of_different_length_are_refused():
-    with pytest.raises(ValueError, match="equally long"):
-        directional_relative_displacement([0.0, 1.0], [0.0], 0.01, 1.0, 0.05, 2.0, 0.05, 0.0)

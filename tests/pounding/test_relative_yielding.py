@@ -129,24 +129,3 @@ def test_a_pair_does_not_depend_on_the_others(ground, pairs, strength):
     alone = yielding_relative_displacement(ground, DT, **part)
     assert_array_equal(whole.one_before_two[17:20], alone.one_before_two)
     assert_array_equal(whole.per[:, 17:20], alone.per)
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"acceleration": np.ones(5)}, "acceleration must be north and east"),
-        ({"yield_displacement_1": 0.0}, "yield_displacement_1"),
-        ({"hardening_2": 1.0}, "hardening_2"),
-        ({"dt": 0.0}, "dt"),
-    ],
-)
-def test_bad_arguments_are_named(changed, message):
-    plain = {
-        "acceleration": np.ones((2, 5)),
-        "dt": DT,
-        "period_1": 1.0,
-        "damping_1": 0.05,
-        "period_2": 1.0,
-    }
-    with pytest.raises(ValueError, match=message):
-        yielding_relative_displacement(**{**plain, "damping_2": 0.05, "azimuth": 0.0, **changed})

@@ -10,14 +10,10 @@ from scipy.integrate import solve_ivp
 from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.structure import Structure
 
+from .made_up import shaking
+
 DT = 0.02
 SOLVER = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15, "max_step": DT / 4}
-
-
-def shaking(seed):
-    """Six seconds of smoothed noise under an envelope, about 3 m/s²."""
-    noise = np.convolve(np.random.default_rng(seed).normal(size=300), np.ones(5) / 5, mode="same")
-    return 6.0 * noise * np.sin(np.pi * np.arange(300) / 300) ** 0.5
 
 
 def relative_acceleration(structure, displacement, velocity, ground):
@@ -81,7 +77,7 @@ def impacts_by_ode(acceleration, structures, gap, restitution, count):
 def test_first_impacts(first, second, gap, restitution):
     # catches: a first root that skips an earlier one, wrong step coefficients, impact with swapped
     # masses
-    structures, acceleration = [Structure(*first), Structure(*second)], shaking(0)
+    structures, acceleration = [Structure(*first), Structure(*second)], shaking(6.0, 0)
     reference = impacts_by_ode(acceleration, structures, gap, restitution, count=6)
     assert len(reference) >= 3
     impacts = pounding_history(acceleration, DT, structures, gap, restitution).impacts
@@ -157,7 +153,7 @@ def bilinear_by_ode(acceleration, structure):
 @pytest.mark.parametrize("oscillator", [(0.7, 0.03), (1.1, 0.05)])
 def test_bilinear_without_contact(oscillator):
     # catches: yield force without hardening, plastic displacement not carried to the next cycle
-    acceleration = shaking(3)
+    acceleration = shaking(6.0, 3)
     structure = Structure(*oscillator, 1.0, yield_displacement=0.02, hardening=0.1)
     history = pounding_history(
         acceleration, DT, [structure, structure], 10.0, 0.5, free_vibration=False

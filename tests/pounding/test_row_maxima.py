@@ -13,16 +13,12 @@ from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
 from per_obspy.spectra.elastic import per_spectrum
 
+from .made_up import shaking
+
 DT = 0.02
 
 
-def shaking(count=600, seed=0):
-    """Smoothed noise under an envelope, about 3 m/s²."""
-    noise = np.convolve(np.random.default_rng(seed).normal(size=count), np.ones(5) / 5, mode="same")
-    return 6.0 * noise * np.sin(np.pi * np.arange(count) / count) ** 0.5
-
-
-NORTH, EAST = shaking(seed=0), shaking(seed=1)
+NORTH, EAST = shaking(12.0, seed=0), shaking(12.0, seed=1)
 
 
 def random_rows(sizes, seed=0, gap=(0.01, 0.05), **fields):

@@ -382,15 +382,3 @@ def test_broadcasting_blocks_and_unchanged_inputs():
     one = single_hit(0.35, 0.4, 1.0, 1.3, 1.0, 2.0, 0.65, 0.5, gaps[68])
     assert one.amplification_1 == table.amplification_1[1, 68]
     np.testing.assert_array_equal(gaps, kept)
-
-
-@pytest.mark.parametrize(("place", "value", "name"), [
-    (0, -1.0, "per_1"), (1, np.inf, "per_2"), (2, 0.0, "period_1"), (3, np.nan, "period_2"),
-    (4, 0.0, "mass_1"), (5, -1.0, "mass_2"), (6, 1.1, "restitution"), (7, -0.1, "critical_gap"),
-    (8, -0.1, "gap"),
-])  # fmt: skip
-def test_bad_arguments_are_named(place, value, name):
-    arguments = [0.3, 0.4, 1.0, 1.3, 1.0, 2.0, 0.65, 0.5, 0.2]
-    arguments[place] = value
-    with pytest.raises(ValueError, match=name):
-        single_hit(*arguments)

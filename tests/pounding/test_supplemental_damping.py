@@ -82,26 +82,3 @@ def test_required_gap_is_the_last_that_fails():
     assert required_gap(*pair, 50.0) == 0.0
     assert required_gap(*pair, 1.0) == pytest.approx(0.5)
     assert np.isnan(required_gap(1.0, 0.3, 1.0, 1.4, 1.0, 1.0, 0.65, 0.2, 1.2))
-
-
-@pytest.mark.parametrize(("name", "changed"), [
-    ("gap", {"gap": -0.1}), ("damping_1", {"damping_1": 1.0}), ("largest", {"largest": 0.0}),
-    ("share_2", {"share_2": -1.0}), ("not below critical", {"largest": 0.96}),
-    ("acceleration", {"acceleration": [np.nan]}),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, changed):
-    arguments = {
-        "acceleration": GROUND,
-        "dt": DT,
-        "period_1": 0.9,
-        "damping_1": 0.05,
-        "period_2": 1.2,
-        "damping_2": 0.05,
-    }
-    with pytest.raises(ValueError, match=name):
-        supplemental_damping(**arguments | {"gap": 0.1} | changed)
-
-
-def test_a_target_below_one_is_refused():
-    with pytest.raises(ValueError, match="target"):
-        required_gap(0.3, 0.4, 1.0, 1.3, 1.0, 2.0, 0.65, 0.5, 0.9)

@@ -68,12 +68,3 @@ def test_broadcasting():
     assert table.shape == (2, 3)
     assert table[0, 0] == pytest.approx(1.0)
     assert table[1, 2] == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(("name", "arguments"), [
-    ("period_1", (0.0, 0.05, 1.0, 0.05)), ("damping_1", (1.0, -0.1, 1.0, 0.05)),
-    ("period_2", (1.0, 0.05, np.nan, 0.05)), ("damping_2", (1.0, 0.05, 1.0, 1.0)),
-])  # fmt: skip
-def test_bad_arguments_are_named(name, arguments):
-    with pytest.raises(ValueError, match=name):
-        ddc_correlation(*arguments)
