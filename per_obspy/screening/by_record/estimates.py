@@ -63,16 +63,15 @@ def demand_columns(
     table |= {"demand": estimate, "demand_estimated": estimate, "estimate_rule": rule}
     # the single hit of the oscillators whose gap governs: if yielding, maybe the equivalent ones
     table |= single_hit_columns(table, governing_radii(table), governing(table, "period"))
-    count = len(rule)
-    table["azimuth_rule"] = np.full(count, azimuth_rule, dtype=object)
+    table["azimuth_rule"] = np.full(rule.size, azimuth_rule, dtype=object)
     # the exact demand replaces the estimate where the record supports it
     if exact:
         azimuth = np.where(azimuth_rule == "station", 0.0, table["azimuth_used"])
         table |= exact_outcome(station, table, azimuth)
         decides = exact_decides(station, table)
     else:
-        table |= no_outcome(count)
-        decides = np.zeros(count, dtype=bool)
+        table |= no_outcome(rule.size)
+        decides = np.zeros(rule.size, dtype=bool)
     table["demand_rule"] = np.where(decides, "exact", rule)
     return table | _without_round_off(table, np.where(decides, table["demand_exact"], estimate))
 

@@ -9,6 +9,8 @@ enough: more damping does not always help. The demand is the one that decides of
 the pair's azimuth, or along the worst one where that is unknown.
 """
 
+from typing import Any
+
 import numpy as np
 
 from per_obspy.checks import FloatArray
@@ -144,12 +146,14 @@ def no_outcome(count: int) -> Columns:
 
 def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
     """Return the largest relative displacement of 1 towards 2, as in :func:`exact_outcome`, m."""
-    return _without_contact(station, table, azimuth)[0]
+    towards: FloatArray = _without_contact(station, table, azimuth)[0]
+    return towards
 
 
 def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) -> Approach:
     """Return the largest relative motion of linear buildings without contact, 1 towards 2."""
-    return approach(*station.components, *_arguments(table, azimuth))
+    relative: Approach = approach(*station.components, *_arguments(table, azimuth))
+    return relative
 
 
 def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -> PoundingMaxima:
@@ -157,10 +161,15 @@ def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -
     (mass_1, mass_2), (share_1, share_2) = both(table, "contact_mass"), both(table, "participation")
     period_1, damping_1, period_2, damping_2 = oscillators(table)
     # bilinear oscillators in order 1, 2; an infinite yield displacement is a linear one
-    return pounding_histories(
+    maxima: PoundingMaxima = pounding_histories(
         np.stack([station.north, station.east]),
         station.dt,
-        *(period_1, damping_1, mass_1, period_2, damping_2, mass_2),
+        period_1,
+        damping_1,
+        mass_1,
+        period_2,
+        damping_2,
+        mass_2,
         gap=values(table, "gap"),
         restitution=values(table, "restitution"),
         participation_1=share_1,
@@ -168,6 +177,7 @@ def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -
         azimuth=azimuth,
         **_strengths(table),
     )
+    return maxima
 
 
 def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
@@ -202,7 +212,7 @@ def _arguments(pairs: Table, azimuth: FloatArray) -> tuple[FloatArray, ...]:
     return *oscillators(pairs), azimuth, *both(pairs, "participation")
 
 
-def _strengths(pairs: Table) -> dict[str, FloatArray]:
+def _strengths(pairs: Table) -> dict[str, Any]:
     """Return yield displacement, m, and hardening of both buildings; NaN of linear ones."""
     strengths = {}
     for i, yields in enumerate(at_contact(pairs, "yield_displacement"), start=1):

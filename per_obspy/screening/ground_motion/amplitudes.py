@@ -293,27 +293,6 @@ class _Model(NamedTuple):
         return quarter
 
 
-class _Neighbours(NamedTuple):
-    """Differences of ln(peak) from the neighbours, their own scales, number and reach."""
-
-    difference: FloatArray
-    scale: FloatArray
-    number: IndexArray
-    reach: FloatArray
-
-    @property
-    def deviations(self) -> FloatArray:
-        """Differences in deviations, by the spread of the other stations where it is larger."""
-        size, scale = np.abs(self.difference), self.scale.copy()
-        compared = np.flatnonzero(np.isfinite(size))
-        # A station does not widen the scale by which it is judged
-        for i in compared if compared.size > 1 else ():
-            others = compared[compared != i]
-            # Median absolute deviation of a normal distribution
-            scale[i] = max(scale[i], 1.4826 * float(np.median(size[others])))
-        return np.nan_to_num(self.difference / scale)
-
-
 def peak_deviations(measure: str, peaks: Peaks, earthquake: Earthquake) -> Deviations:
     """
     Compare a peak of every station with its neighbours and with the earthquake.
@@ -329,20 +308,21 @@ def peak_deviations(measure: str, peaks: Peaks, earthquake: Earthquake) -> Devia
     """
     value = _logarithms(getattr(peaks, measure), peaks.longitude)
     model = _model(measure, peaks, earthquake)
-    neighbours = _neighbours(value, model, peaks, np.isfinite(earthquake.longitude).item())
-    by_neighbours, by_model = neighbours.deviations, np.zeros(value.size)
-    # Without a magnitude the model has only a shape
+    has_source = np.isfinite(earthquake.longitude).item()
+    difference, scale, number, reach = _neighbours(value, model, peaks, has_source)
+    by_neighbours, by_model = _in_scales(difference, scale), np.zeros(value.size)
+    # without a magnitude the model has only a shape
     if np.isfinite([earthquake.longitude, earthquake.magnitude]).all():
         by_neighbours = _unless_doubted(by_neighbours, (value - model.middle) / model.deviation)
         by_model = _from_model(value, model)
-    # The larger of both
+    # the larger of both
     larger = np.abs(by_model) > np.abs(by_neighbours)
     edge = np.where(by_model > 0, model.nearest, model.farthest)
     return Deviations(
         np.where(larger, by_model, by_neighbours),
-        np.exp(np.where(larger, edge, value - neighbours.difference)),
-        np.where(larger, 0, neighbours.number),
-        np.where(larger, np.nan, neighbours.reach),
+        np.exp(np.where(larger, edge, value - difference)),
+        np.where(larger, 0, number).astype(np.intp),
+        np.where(larger, np.nan, reach),
     )
 
 
@@ -350,6 +330,18 @@ def _logarithms(peak: FloatArray, longitude: FloatArray) -> FloatArray:
     """Return the logarithms of peaks, NaN without motion or place."""
     usable = (peak > 0) & np.isfinite(peak) & np.isfinite(longitude)
     return np.log(np.where(usable, peak, np.nan))
+
+
+def _in_scales(difference: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return differences in deviations, by the spread of the other stations where it is larger."""
+    size, scale = np.abs(difference), scale.copy()
+    compared = np.flatnonzero(np.isfinite(size))
+    # A station does not widen the scale by which it is judged
+    for i in compared if compared.size > 1 else ():
+        others = compared[compared != i]
+        # Median absolute deviation of a normal distribution
+        scale[i] = max(scale[i], 1.4826 * float(np.median(size[others])))
+    return np.nan_to_num(difference / scale)
 
 
 def _model(measure: str, peaks: Peaks, earthquake: Earthquake) -> _Model:
@@ -384,32 +376,31 @@ def _unless_doubted(by_neighbours: FloatArray, by_model: FloatArray) -> FloatArr
     return np.where(agreement < DOUBTED_MUCH, np.clip(kept, -REJECTED, REJECTED), kept)
 
 
-def _neighbours(value: FloatArray, model: _Model, peaks: Peaks, has_source: bool) -> _Neighbours:
-    """Compare the ratio of every peak to the model with the median of its neighbours."""
+def _neighbours(value: FloatArray, model: _Model, peaks: Peaks, has_source: bool) -> FloatArray:
+    """
+    Compare the ratio of every peak to the model with the median of its neighbours.
+
+    Returns differences of ln(peak), their own scales, number and reach (m) of the neighbours, as
+    rows; few neighbours say nothing (NaN).
+    """
     residual = value - model.middle
-    difference, scale, reach = np.full((3, value.size), np.nan)
-    number = np.zeros(value.size, dtype=np.intp)
+    rows = np.full((4, value.size), np.nan)
+    rows[2] = 0
     usable = np.isfinite(residual)
-    # Few neighbours say nothing
+    growth = BY_REGION if has_source else WITHOUT_SOURCE
     for i in np.flatnonzero(usable).tolist():
         near, distance = _nearest(i, usable, peaks)
         if near.size < FEWEST_NEIGHBOURS:
             continue
-        difference[i] = residual[i] - np.median(residual[near])
-        number[i], reach[i] = near.size, distance.max()
-        scale[i] = _scale(model, i, near, distance, BY_REGION if has_source else WITHOUT_SOURCE)
-    return _Neighbours(difference, scale, number, reach)
-
-
-def _scale(
-    model: _Model, station: int, near: IndexArray, distance: FloatArray, growth: float
-) -> float:
-    """Return the deviation of a difference from neighbours in their distances."""
-    # Ground and path of the station and of the median, attenuation, extent of the rupture
-    own = model.within[station] * np.sqrt(1.0 + MEDIAN_VARIANCE / near.size)
-    away = growth * np.log1p(np.median(distance) / NEAR)
-    extent = model.extent[station] - np.median(model.extent[near])
-    return float(np.hypot(np.hypot(own, away), extent))
+        # Ground and path of the station and of the median, attenuation, extent of the rupture
+        own = model.within[i] * np.sqrt(1.0 + MEDIAN_VARIANCE / near.size)
+        away = growth * np.log1p(np.median(distance) / NEAR)
+        extent = model.extent[i] - np.median(model.extent[near])
+        scale = np.hypot(np.hypot(own, away), extent)
+        # what the peak differs by
+        difference = residual[i] - np.median(residual[near])
+        rows[:, i] = difference, scale, near.size, distance.max()
+    return rows
 
 
 def _nearest(station: int, usable: BoolArray, peaks: Peaks) -> tuple[IndexArray, FloatArray]:
@@ -419,9 +410,8 @@ def _nearest(station: int, usable: BoolArray, peaks: Peaks) -> tuple[IndexArray,
     # Ground of the same class
     own = peaks.site_class[station]
     alike = others & (peaks.site_class == own)
-    index = np.flatnonzero(
-        alike if own and np.count_nonzero(alike) >= FEWEST_NEIGHBOURS else others
-    )
+    enough = own and np.count_nonzero(alike) >= FEWEST_NEIGHBOURS
+    index = np.flatnonzero(alike if enough else others)
     east, north = peaks.longitude, peaks.latitude
     distance = great_circle(east[station], north[station], east[index], north[index])
     nearest = np.argsort(distance, kind="stable")[:MOST_NEIGHBOURS]
@@ -431,22 +421,7 @@ def _nearest(station: int, usable: BoolArray, peaks: Peaks) -> tuple[IndexArray,
 def peak_sentence(
     measure: str, peak: float, found: Deviations, station: int, earthquake: Earthquake
 ) -> str:
-    """
-    Return a sentence with peak, expected peak and deviations, and the unit that explains it.
-
-    Parameters
-    ----------
-    measure : str
-        ``"pga"`` or ``"pgv"``.
-    peak : float
-        m/s2 or m/s.
-    found : Deviations
-        Of this measure.
-    station : int
-        Index of the station.
-    earthquake : Earthquake
-        As for :func:`peak_deviations`.
-    """
+    """Return a sentence with peak, expected peak and deviations, and the unit that explains it."""
     # From neighbours, or from the model
     name, unit = MEASURES[measure]
     expected, count = found.expected[station], found.neighbours[station]

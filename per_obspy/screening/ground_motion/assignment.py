@@ -40,13 +40,7 @@ class Sites(NamedTuple):
 
     def at(self, rows: IndexArray | BoolArray) -> "Sites":
         """Return some of the places."""
-        return Sites(
-            self.longitude[rows],
-            self.latitude[rows],
-            self.site_class[rows],
-            self.source_distance[rows],
-            self.vs30[rows],
-        )
+        return Sites._make(column[rows] for column in self)
 
 
 def sites(
@@ -96,7 +90,14 @@ class Stations(NamedTuple):
 
 def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejection, ...]]:
     """Return the stations that have coordinates, and rejections of those that have none."""
-    located = [station for station in datasets if np.isfinite(station["latitude"].item())]
+    located, rejections = list[xr.Dataset](), list[Rejection]()
+    for station in datasets:
+        # Without coordinates a station cannot be the nearest to any pair
+        if np.isfinite(station["latitude"].item()):
+            located.append(station)
+        else:
+            reasons = ("its coordinates are unknown: it serves no pair",)
+            rejections.append(Rejection("station", station["station"].item(), "", None, reasons))
     stations = Stations(
         names=np.array([station["station"].item() for station in located], dtype=object),
         longitude=np.array([number(station, "longitude") for station in located]),
@@ -104,14 +105,7 @@ def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejecti
         site_class=np.array([site_class_of(station) for station in located], dtype=object),
         read=located.__getitem__,
     )
-    # Without coordinates a station cannot be the nearest to any pair
-    reasons = ("its coordinates are unknown: it serves no pair",)
-    rejections = tuple(
-        Rejection("station", station["station"].item(), "", None, reasons)
-        for station in datasets
-        if not np.isfinite(station["latitude"].item())
-    )
-    return stations, rejections
+    return stations, tuple(rejections)
 
 
 def site_class_of(station: xr.Dataset) -> str:
@@ -139,12 +133,13 @@ def assigned(
         Largest distance, m.
     """
     if not stations.names.size:
-        return _without_stations(pairs)
-    if "site_class" in pairs:
-        site_class = pairs["site_class"].to_numpy(object)
-    else:
-        site_class = np.full(len(pairs), "", dtype=object)
-
+        no = pairs.iloc[:0].assign(
+            station="", station_index=0, distance=0.0, other_site_class=False
+        )
+        reasons = ("no station has coordinates",)
+        return no, tuple(Rejection("pair", name, "", None, reasons) for name in pairs["pair_id"])
+    unknown = np.full(len(pairs), "", dtype=object)
+    site_class = pairs["site_class"].to_numpy(object) if "site_class" in pairs else unknown
     # The station of every pair, and whether its ground is of another class
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
     index, distance = _serving_station(longitude, latitude, site_class, stations, reach)
@@ -159,13 +154,6 @@ def assigned(
 
     # Pairs beyond the reach are left out
     return placed[distance <= reach], _out_of_reach(placed[distance > reach], stations, reach)
-
-
-def _without_stations(pairs: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
-    """Return an empty table and one rejection per pair, for a region without stations."""
-    none = pairs.iloc[:0].assign(station="", station_index=0, distance=0.0, other_site_class=False)
-    reasons = ("no station has coordinates",)
-    return none, tuple(Rejection("pair", name, "", None, reasons) for name in pairs["pair_id"])
 
 
 def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[Rejection, ...]:

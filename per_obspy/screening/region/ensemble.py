@@ -10,7 +10,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
-from per_obspy.screening.values import BoolArray, Both, TextArray
+from per_obspy.screening.values import BoolArray, Both, Columns, IndexArray
 
 
 def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> FloatArray:
@@ -173,32 +173,29 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
         Columns of :func:`ensemble_columns` without ``rank``, in the order of the rows; without the
         pairs that :func:`ensemble_rejections` names.
     """
-    rows = joined[_comparable(joined, weights)]
-    pounding = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
+    rows = joined[_comparable(joined, weights)].reset_index(drop=True)
     weight = np.array(list(weights.values()))
-
-    # Probabilities and severities over all scenarios
-    columns = {"probability": conditional_probability(pounding.T, weight)}
-    if yearly:
-        columns["annual_probability"] = annual_probability(pounding.T, weight)
-    for name, unknown in SEVERITY.items():
-        severity = rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64)
-        beyond = np.nan_to_num(severity - unknown)
-        columns[name] = unknown + _weighted_sum(beyond.T, weight / weight.sum())
-    # in the order of the table
-    names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
-    return rows.assign(**columns, worst_scenario=_worst(rows, weights))[names].reset_index(
-        drop=True
+    pounding, velocity, amplification = (
+        rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64).T
+        for name in ("probability", *SEVERITY)
     )
+    # Probabilities and severities over all scenarios
+    columns: Columns = {"probability": conditional_probability(pounding, weight)}
+    if yearly:
+        columns["annual_probability"] = annual_probability(pounding, weight)
+    for severity, (name, unknown) in zip((velocity, amplification), SEVERITY.items(), strict=True):
+        beyond = np.nan_to_num(severity - unknown)
+        columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
+    # the hardest impact
+    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, velocity)]
+    names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
+    return rows.assign(**columns)[names]
 
 
-def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> TextArray:
-    """Return the scenario of the hardest impact of each pair; the likeliest of equal ones."""
-    probability = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
-    velocity = rows[[f"expected_impact_velocity_{name}" for name in weights]].to_numpy(np.float64)
-    # the last key decides; the first scenario of those alike
-    order = np.lexsort((-probability, -np.nan_to_num(velocity)), axis=1)
-    return np.array(list(weights), dtype=object)[order[:, 0]]
+def _worst(pounding: FloatArray, velocity: FloatArray) -> IndexArray:
+    """Return the scenario of the hardest impact of each pair; of equal ones the likeliest."""
+    order = np.lexsort((-pounding, -np.nan_to_num(velocity)), axis=0)
+    return np.asarray(order[0])
 
 
 def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:

@@ -13,8 +13,9 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
+from per_obspy.screening.ground_motion.assignment import on_sphere
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.values import TextArray
+from per_obspy.screening.values import TextArray, values
 
 
 def hexagons(longitude: ArrayLike, latitude: ArrayLike, resolution: int) -> TextArray:
@@ -58,15 +59,11 @@ def hexagon_outlines(cells: Iterable[str]) -> list[FloatArray]:
     """
     from h3 import cell_to_boundary
 
-    return [_unbroken(np.array(cell_to_boundary(cell))[:, ::-1]) for cell in cells]
-
-
-def _unbroken(corners: FloatArray) -> FloatArray:
-    """Return corners with longitudes without jumps by 360 degrees."""
-    east = corners[:, 0]
-    if np.ptp(east) <= 180.0:
-        return corners
-    return np.column_stack([east % 360.0, corners[:, 1]])
+    outlines = [np.array(cell_to_boundary(cell))[:, ::-1] for cell in cells]
+    for corners in outlines:
+        if np.ptp(corners[:, 0]) > 180.0:
+            corners[:, 0] %= 360.0
+    return outlines
 
 
 def box_outlines(boxes: pd.DataFrame) -> FloatArray:
@@ -81,6 +78,13 @@ ROW_FACTOR = 1 << 32
 
 #: Column of the number of pairs whose probability is 1, which are half of a usual table.
 CERTAIN = "certain"
+
+#: Columns of the worst pair -> their names in the totals.
+WORST = {
+    "pair_id": "worst_pair",
+    "state": "worst_state",
+    "expected_impact_velocity": "worst_expected_impact_velocity",
+}
 
 #: Unit and meaning of the columns of a table of totals; each risk class adds a column
 #: ``class_...``.
@@ -179,20 +183,27 @@ class ExpectedCount(NamedTuple):
     std_common: float
 
 
+#: Columns of an expected count.
+EXPECTED = tuple(f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common"))
+
+
 class GridCells(NamedTuple):
-    """
-    Cells of a grid, with the places in them.
+    """Cells of a grid, with the places in them."""
 
-    Attributes
-    ----------
-    cell : (n_places,) ndarray of str
-        The cell of each place.
-    boxes : DataFrame
-        ``west, south, east, north`` in degrees, indexed by the cell.
-    """
+    cell: TextArray  # of each place
+    boxes: pd.DataFrame  # ``west, south, east, north`` in degrees, indexed by the cell
 
-    cell: TextArray
-    boxes: pd.DataFrame
+
+class PartialTotals(NamedTuple):
+    """Contribution of a piece of a risk table to the totals."""
+
+    # Numbers of pairs, and sums of their positions on the unit sphere, by area
+    sums: pd.DataFrame
+    # The worst pair of each area with its ``rank``
+    worst: pd.DataFrame
+    # Area and probability of each pair whose probability is neither 0 nor 1, at most 12 bytes per
+    # pair; pairs of probability 1 are counted in the sums
+    probabilities: tuple[pd.DataFrame, ...]
 
 
 def expected_count(probability: ArrayLike) -> ExpectedCount:
@@ -223,98 +234,43 @@ def expected_count(probability: ArrayLike) -> ExpectedCount:
     return ExpectedCount(mean, independent, float(np.sqrt(max(second - mean**2, 0.0))))
 
 
-def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
-    """
-    Count the pairs of every area.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Risk table; with a column ``probability`` (of pounding) there are expected numbers, of the
-        pairs that have one.
-    area : (n_pairs,) array_like of str
-        Area or cell of each pair.
-
-    Returns
-    -------
-    DataFrame
-        One row per area, in the order of their names: the columns of ``TOTALS`` and ``class_...``
-        for every risk class.
-    """
-    return joined_totals([partial_totals(table, area, table["risk_class"].unique())])
-
-
-class PartialTotals(NamedTuple):
-    """
-    Contribution of a piece of a risk table to the totals.
-
-    Attributes
-    ----------
-    sums : DataFrame
-        Numbers of pairs, and sums of their positions on the unit sphere, by area.
-    worst : DataFrame
-        The worst pair of each area with its ``rank``.
-    probabilities : tuple of DataFrame
-        Area and probability of each pair whose probability is neither 0 nor 1, at most 12 bytes
-        per pair; pairs of probability 1 are counted in the sums.
-    """
-
-    sums: pd.DataFrame
-    worst: pd.DataFrame
-    probabilities: tuple[pd.DataFrame, ...]
-
-
 def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str]) -> PartialTotals:
     """
-    Count a piece of a risk table, as :func:`totals` does.
+    Count the pairs of every area in a piece of a risk table, to be joined by :func:`joined_totals`.
 
     Parameters
     ----------
     table : DataFrame
-        Piece of a risk table.
+        Piece of a risk table; with a column ``probability`` there are expected numbers, of the
+        pairs that have one.
     area : (n_pairs,) array_like of str
         Area or cell of each pair.
     classes : iterable of str
         Names of the risk classes.
-
-    Returns
-    -------
-    PartialTotals
-        Contribution of the piece, to be joined by :func:`joined_totals`.
     """
-    # Truth values and ones, which are summed up to numbers of pairs
     rows = table.assign(area=np.asarray(area, dtype=object))
+    # Truth values and ones, which are summed up to numbers of pairs
     added: dict[str, object] = {"pairs": 1}
-    for state in EVERY_STATE:
-        added[state] = rows["state"] == state
-    for name in classes:
-        added[f"class_{name}"] = rows["risk_class"] == name
-
+    added |= {state: rows["state"] == state for state in EVERY_STATE}
+    added |= {f"class_{name}": rows["risk_class"] == name for name in classes}
     # Positions on the unit sphere, of which the mean direction is the middle of the area
-    east, north = np.radians(rows["longitude"]), np.radians(rows["latitude"])
-    added["x"] = np.cos(north) * np.cos(east)
-    added["y"] = np.cos(north) * np.sin(east)
-    added["z"] = np.sin(north)
-    probabilities = tuple[pd.DataFrame, ...]()
+    added |= dict(
+        zip("xyz", on_sphere(values(rows, "longitude"), values(rows, "latitude")).T, strict=True)
+    )
     if "probability" in rows:
         added[CERTAIN] = rows["probability"] == 1.0
-        probabilities = (_probabilities(rows),)
-    sums = pd.DataFrame(added).groupby(rows["area"]).sum()
-    return PartialTotals(sums, _worst_pairs(rows), probabilities)
+    sums = pd.DataFrame(added, index=rows.index).groupby(rows["area"]).sum()
+    worst = rows.sort_values("rank").drop_duplicates("area")[["area", "rank", *WORST]]
+    return PartialTotals(sums, worst, _uncertain(rows))
 
 
-def _worst_pairs(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the pair of the smallest rank of each area."""
-    worst = rows.sort_values("rank").drop_duplicates("area")
-    return worst[["area", "rank", "pair_id", "state", "expected_impact_velocity"]]
-
-
-def _probabilities(rows: pd.DataFrame) -> pd.DataFrame:
+def _uncertain(rows: pd.DataFrame) -> tuple[pd.DataFrame, ...]:
     """Return area and probability of the pairs whose probability is neither 0 nor 1."""
+    if "probability" not in rows:
+        return ()
     between = rows["probability"].between(0.0, 1.0, inclusive="neither")
     # A copy: a view would keep all columns of the piece in memory
-    kept = rows.loc[between, ["area", "probability"]]
-    return kept.astype({"area": "category"}).copy()
+    return (rows.loc[between, ["area", "probability"]].astype({"area": "category"}).copy(),)
 
 
 def joined_parts(parts: Iterable[PartialTotals]) -> PartialTotals:
@@ -327,42 +283,26 @@ def joined_parts(parts: Iterable[PartialTotals]) -> PartialTotals:
 
 def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
     """
-    Join the contributions of pieces to the totals of the whole table.
-
-    Parameters
-    ----------
-    parts : iterable of PartialTotals
-        From :func:`partial_totals`, at least one.
+    Join the contributions of pieces, at least one, to the totals of the whole table.
 
     Returns
     -------
     DataFrame
-        See :func:`totals`.
+        One row per area, in the order of their names: the columns of ``TOTALS`` and ``class_...``
+        for every risk class.
     """
-    whole = joined_parts(parts)
-    counted = whole.sums
+    counted, worst, probabilities = joined_parts(parts)
     x, y, z = (counted.pop(name) for name in "xyz")
     counted = counted.astype(np.int64)
-
     # Areas without any probability expect no pounding pair
-    if whole.probabilities:
-        expected = _expected(whole.probabilities, counted.pop(CERTAIN))
+    if probabilities:
+        expected = _expected(probabilities, counted.pop(CERTAIN))
         counted = counted.join(expected).fillna(dict.fromkeys(EXPECTED, 0.0))
-    counted = counted.join(_worst_of(whole.worst))
-
+    counted = counted.join(worst.set_index("area")[[*WORST]].rename(columns=WORST))
     # The middle is the mean direction, which holds across the date line too
     latitude = np.degrees(np.arctan2(z, np.hypot(x, y)))
     table: pd.DataFrame = counted.assign(longitude=np.degrees(np.arctan2(y, x)), latitude=latitude)
     return table.rename_axis("area").reset_index()
-
-
-EXPECTED = tuple(f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common"))
-
-
-def _worst_of(worst: pd.DataFrame) -> pd.DataFrame:
-    """Return the worst pair of each area with the names of its columns in the totals."""
-    named = worst.set_index("area").drop(columns="rank")
-    return named.add_prefix("worst_").rename(columns={"worst_pair_id": "worst_pair"})
 
 
 def _expected(pieces: Sequence[pd.DataFrame], certain: "pd.Series[int]") -> pd.DataFrame:
@@ -376,9 +316,9 @@ def _expected(pieces: Sequence[pd.DataFrame], certain: "pd.Series[int]") -> pd.D
     counts = {}
     for name, code in zip(certain.index, area.categories.get_indexer(certain.index), strict=True):
         some = order[ends[code - 1] if code > 0 else 0 : ends[code]] if code >= 0 else order[:0]
-        values = np.concatenate([np.ones(certain[name]), probability[some]])
-        if values.size:
-            counts[name] = expected_count(values)
+        chances = np.concatenate([np.ones(certain[name]), probability[some]])
+        if chances.size:
+            counts[name] = expected_count(chances)
     return pd.DataFrame(counts, index=list(EXPECTED)).T
 
 
@@ -391,13 +331,13 @@ def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCe
     longitude, latitude : (n_places,) array_like
         Degrees east and north.
     size : float
-        Extent of a cell, m. Rows are exactly that high; cells are as wide as a whole number of them
-        around the row allows.
+        Extent of a cell, m, from 1 m to 10 000 km. Rows are exactly that high; cells are as wide as
+        a whole number of them around the row allows.
 
     Raises
     ------
     ValueError
-        If a coordinate is out of range or the size is not above 1 m.
+        If a coordinate or the size is out of range.
 
     Examples
     --------
@@ -406,42 +346,28 @@ def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCe
     """
     east = np.atleast_1d(checks.between("longitude", longitude, -180.0, 180.0))
     north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0))
-    high = np.degrees(checks.number("size", size, _above_one_metre) / EARTH_RADIUS)
-
+    metres = checks.number("size", size, lambda name, value: checks.between(name, value, 1.0, 1e7))
+    high = np.degrees(metres / EARTH_RADIUS)
     # Rows of equal height, each cut into a whole number of cells
     row = np.floor(north / high).astype(np.int64)
-    around = _cells_around(row, high)
+    middle = np.radians(np.minimum(np.abs(row + 0.5) * high, 90.0))
+    around = np.maximum(np.rint(360.0 * np.cos(middle) / high).astype(np.int64), 1)
     column = np.floor((east % 360.0) / 360.0 * around).astype(np.int64)
-    column = np.minimum(column, around - 1)
+    # round-off may reach the next column
+    return _named_cells(row, np.minimum(column, around - 1), 360.0 / around, high)
 
+
+def _named_cells(
+    row: NDArray[np.int64], column: NDArray[np.int64], wide: FloatArray, high: float
+) -> GridCells:
+    """Return the cells of places, with names and limits; a cell is so wide and high, degrees."""
     # The cells that hold a place, each once
     number = row * ROW_FACTOR + column
     _, first, cell = np.unique(number, return_index=True, return_inverse=True)
-    boxes = _boxes(row[first], column[first], around[first], high)
-    return GridCells(boxes.index.to_numpy(object)[cell], boxes)
-
-
-def _boxes(
-    row: NDArray[np.int64], column: NDArray[np.int64], around: NDArray[np.int64], high: float
-) -> pd.DataFrame:
-    """Return names and limits of cells, degrees; ``high`` is the height of a row."""
+    row, column, wide = row[first], column[first], wide[first]
     names = [f"r{i} c{k}" for i, k in zip(row.tolist(), column.tolist(), strict=True)]
-    wide = 360.0 / around
     # West from -180 up to 180; east may lie beyond 180
-    west = (column * wide + 180.0) % 360.0 - 180.0
-    south = row * high
+    west, south = (column * wide + 180.0) % 360.0 - 180.0, row * high
     limits = {"west": west, "south": south, "east": west + wide, "north": south + high}
-    return pd.DataFrame(limits, index=np.array(names, dtype=object))
-
-
-def _cells_around(row: NDArray[np.int64], high: float) -> NDArray[np.int64]:
-    """Return the number of cells around the earth in a row."""
-    middle = np.radians(np.minimum(np.abs(row + 0.5) * high, 90.0))
-    count = np.rint(360.0 * np.cos(middle) / high).astype(np.int64)
-    around: NDArray[np.int64] = np.maximum(count, 1)
-    return around
-
-
-def _above_one_metre(name: str, values: ArrayLike) -> FloatArray:
-    """Check the extent of a cell: from 1 m to more than a quarter of the Earth's circumference."""
-    return checks.between(name, values, 1.0, 1e7)
+    boxes = pd.DataFrame(limits, index=np.array(names, dtype=object))
+    return GridCells(boxes.index.to_numpy(object)[cell], boxes)

@@ -88,16 +88,9 @@ def site_demand(station: StationMotion, table: Table, screening: Screening) -> S
     """
     Return the relation of the exact demand at the sites to that of the records.
 
-    Parameters
-    ----------
-    station : StationMotion
-        The record, with its stored spectra.
-    table : Table
-        Rows of the risk table with ``azimuth``, ``azimuth_used``, radii, and ``distance`` and the
-        columns of :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs` where the
-        motion at the site is known.
-    screening : Screening
-        ``model_median``, and the constants of ``interpolation``.
+    Rows have ``azimuth``, ``azimuth_used``, radii, and ``distance`` and the columns of
+    :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs` where the motion at the
+    site is known.
     """
     settings = screening.interpolation
     correlation = demand_correlation(table, settings)
@@ -119,16 +112,7 @@ def site_demand(station: StationMotion, table: Table, screening: Screening) -> S
 def median_at_site(
     demand: FloatArray, weight: FloatArray, ln_ratio: FloatArray, ln_field: FloatArray
 ) -> FloatArray:
-    """
-    Return the median demand at the site, m, for demands of the record; 0 stays 0.
-
-    Parameters
-    ----------
-    demand : ndarray
-        Exact demand of the record, m.
-    weight, ln_ratio, ln_field : ndarray
-        Of :class:`SiteDemand`, of a shape that broadcasts.
-    """
+    """Return the median demand at the site, m, see :class:`SiteDemand`; 0 stays 0."""
     moves = demand > 0
     record = np.log(np.where(moves, demand, 1.0)) + ln_ratio
     # at the record the field has no effect, even for equal buildings, whose gap is 0
@@ -152,14 +136,7 @@ def estimate_log_std(table: Table, log_std: FloatArray, settings: Interpolation)
     """
     Return the deviation of an estimate over the exact demand at the site.
 
-    Parameters
-    ----------
-    table : Table
-        As of :func:`site_demand`.
-    log_std : (n_pairs,) ndarray
-        At the record. It grows to ``demand_log_std`` far away, where that is larger.
-    settings : Interpolation
-        Constants of the correlation.
+    It grows from ``log_std`` at the record to ``demand_log_std`` far away, where that is larger.
     """
     correlation = demand_correlation(table, settings)
     persistence = settings.demand_persistence
@@ -172,19 +149,18 @@ def estimate_log_std(table: Table, log_std: FloatArray, settings: Interpolation)
 
 def pair_at_site(table: Table) -> Both:
     """Return ln of the gap by PER at the site over that at the record, and its deviation."""
-    ln_ratio_1, log_std_1 = motion_at_site(table, 1)
-    ln_ratio_2, log_std_2 = motion_at_site(table, 2)
-    ratios, log_stds = (ln_ratio_1, ln_ratio_2), (log_std_1, log_std_2)
-    return pair_motion(at_contact(table, "per"), ratios, log_stds, both(table, "period"))
+    return pair_motion(at_contact(table, "per"), *motion_at_site(table), both(table, "period"))
 
 
-def motion_at_site(table: Table, i: int) -> Both:
-    """Return ln of radius i at the site over that of the record and its deviation; 0 if unknown."""
+def motion_at_site(table: Table) -> tuple[Both, Both]:
+    """Return ln of both radii at the site over the record's, and deviations; 0 if unknown."""
     if "ln_per_ratio_1" not in table:
         at_record = np.zeros_like(values(table, "gap"))
-        return at_record, at_record
-    ln_ratio, log_std = values(table, f"ln_per_ratio_{i}"), values(table, f"ln_per_std_{i}")
-    return np.nan_to_num(ln_ratio), np.nan_to_num(log_std)
+        return (at_record, at_record), (at_record, at_record)
+    # unknown ones are NaN
+    (ratio_1, ratio_2), (std_1, std_2) = both(table, "ln_per_ratio"), both(table, "ln_per_std")
+    ratios = np.nan_to_num(ratio_1), np.nan_to_num(ratio_2)
+    return ratios, (np.nan_to_num(std_1), np.nan_to_num(std_2))
 
 
 def ln_field_demand(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
@@ -193,41 +169,36 @@ def ln_field_demand(station: StationMotion, table: Table, screening: Screening) 
 
     Minus infinity of pairs that move as one: equal buildings need no gap.
     """
-    # radii of both buildings at the site, with the correlation of eq. (16)
-    row = nearest_azimuth(station, table)
-    given = np.isfinite(values(table, "azimuth"))
-    radius_1 = _radius_at_site(station, table, 1, row, given)
-    radius_2 = _radius_at_site(station, table, 2, row, given)
-    gap = critical_gap(radius_1, radius_2, pair_correlation(table))
+    row, ratios = nearest_azimuth(station, table), motion_at_site(table)[0]
+    share_1, share_2 = both(table, "participation")
+    radius_1 = share_1 * np.exp(_stored_radius(station, table, 1, row) + ratios[0])
+    radius_2 = share_2 * np.exp(_stored_radius(station, table, 2, row) + ratios[1])
     # the estimate is larger than the exact demand in the median
+    gap = critical_gap(radius_1, radius_2, pair_correlation(table))
     with np.errstate(divide="ignore"):
         ln_demand: FloatArray = np.log(gap / screening.model_median)
     return ln_demand
 
 
-def _radius_at_site(
-    station: StationMotion,
-    table: Table,
-    i: int,
-    row: IndexArray,
-    given: BoolArray,
-) -> FloatArray:
-    """Return the radius of building i at contact height at the site, from stored spectra, m."""
-    oscillator = log_oscillator(table, i)
-    # known azimuths take the median over all, the others the record's worst; few tables have both
+def _stored_radius(station: StationMotion, table: Table, i: int, row: IndexArray) -> FloatArray:
+    """
+    Return ln of the stored radius of building i, m.
+
+    Known azimuths take the median over all, the others the record's worst; few tables have both.
+    """
+    oscillator, given = log_oscillator(table, i), np.isfinite(values(table, "azimuth"))
     stored = np.empty(row.size)
+    # whole tables first, which need no choice
     for mask, spectra, rows in (
         (given, station.per_rotd50, np.zeros_like(row)),
         (~given, station.per, row),
     ):
         if mask.all():
-            stored = stored_log(spectra, rows, *oscillator)
-        elif mask.any():
+            return stored_log(spectra, rows, *oscillator)
+        if mask.any():
             some = (column[mask] for column in oscillator)
             stored[mask] = stored_log(spectra, rows[mask], *some)
-    ln_ratio, _ = motion_at_site(table, i)
-    radius: FloatArray = values(table, f"participation_{i}") * np.exp(stored + ln_ratio)
-    return radius
+    return stored
 
 
 #: Below this period (s) the published correlation has another form.
@@ -296,79 +267,57 @@ def pair_motion(
     """
     Return ln of the needed gap at the site over that at the record, and its deviation.
 
-    Parameters
-    ----------
-    radii : pair of (n_pairs,) ndarray
-        Both radii at contact height, m.
-    ln_ratios : pair of (n_pairs,) ndarray
-        Logarithm of the radius at the site over this one, dimensionless.
-    log_stds : pair of (n_pairs,) ndarray
-        Log-standard deviations of the radii at the site, dimensionless.
-    periods : pair of (n_pairs,) ndarray
-        s.
-
-    Returns
-    -------
-    ln_ratio, log_std : (n_pairs,) ndarray
-        Dimensionless. The ratio is that of the roots of the sums of squares at the site and here:
-        both radii alike change the gap alike, a radius of 0 has no weight, and no correlation of
-        the two responses, in which the gap of radii that nearly cancel would be infinitely
-        sensitive, is needed. The deviation is that of the same gap to first order, with the
-        correlation of :func:`period_correlation` between the two.
+    ``radii`` of both buildings are at contact height, m; ``ln_ratios`` and ``log_stds`` are those
+    of the radii at the site over these. The ratio is that of the roots of the sums of squares at
+    the site and here: both radii alike change the gap alike, a radius of 0 has no weight, and no
+    correlation of the two responses, in which the gap of radii that nearly cancel would be
+    infinitely sensitive, is needed. The deviation is that of the same gap to first order, with the
+    correlation of :func:`period_correlation` between the two.
     """
-    (radius_1, radius_2), (ratio_1, ratio_2) = radii, ln_ratios
-    square_1, square_2 = np.square(radius_1), np.square(radius_2)
-    site_1, site_2 = square_1 * np.exp(2.0 * ratio_1), square_2 * np.exp(2.0 * ratio_2)
-    # squared gap of uncorrelated responses, here and at the site
-    before, after = square_1 + square_2, site_1 + site_2
+    here = np.square(np.stack(radii))
+    site = here * np.exp(2.0 * np.stack(ln_ratios))
+    # squared gap of uncorrelated responses, here and at the site; pairs without motion have none
+    before, after = here[0] + here[1], site[0] + site[1]
     moving = before > 0.0
-    growth = np.divide(after, before, out=np.ones_like(after), where=moving)
-    ln_ratio = 0.5 * np.log(growth)
+    ln_ratio = 0.5 * np.log(np.divide(after, before, out=np.ones_like(after), where=moving))
     # first-order propagation of both correlated deviations
-    weight_1, weight_2 = _share(site_1, after, moving), _share(site_2, after, moving)
-    first, second = weight_1 * log_stds[0], weight_2 * log_stds[1]
+    share = np.divide(site, after, out=np.full_like(site, 0.5), where=moving)
+    first, second = share * np.stack(log_stds)
     variance = first**2 + second**2 + 2.0 * period_correlation(*periods) * first * second
     return ln_ratio, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _share(part: FloatArray, whole: FloatArray, moving: BoolArray) -> FloatArray:
-    """Return part / whole of the squared gap, 0.5 for pairs without motion."""
-    return np.divide(part, whole, out=np.full_like(whole, 0.5), where=moving)
-
-
 def record_motion(station: StationMotion, table: Table, screening: Screening) -> UncertainMotion:
     """
-    Return the uncertain motion of every pair of a block.
+    Return the uncertain motion of every pair of a block of the risk table.
 
-    Parameters
-    ----------
-    station : StationMotion
-        The record, with its stored spectra.
-    table : Table
-        Rows of the risk table with periods, dampings, their log-standard deviations, radii,
-        correlations and demand; ``distance`` and the motion at the site, where the table has it,
-        of :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs`.
-    screening : Screening
-        Medians and log-standard deviations of the critical gap from PER, and of the linearized one,
-        over the exact one.
-
-    Returns
-    -------
-    UncertainMotion
-        Its rows are those of the stored PER of the station. Where the exact demand decides the
-        radii are those of PER, without the error of an estimate.
+    Its rows are those of the stored PER of the station. Where the exact demand decides the radii
+    are those of PER, without the error of an estimate; elsewhere the estimate's median and
+    deviation over the exact one are those of the settings.
     """
-    first, second = (_radius(table, i, screening) for i in (1, 2))
+    exact, linearized = is_exact(table), np.asarray(table["demand_rule"] == "linearized")
+    # the median of the estimate over the exact demand is taken off the radius
+    medians = screening.linearized_median, screening.model_median
+    bias = np.where(exact, 1.0, np.where(linearized, *medians))
+    ratios, _ = motion_at_site(table)
+    first, second = (
+        UncertainRadius(
+            values(table, f"participation_{i}") * _deciding(table, f"per_{i}", linearized) / bias,
+            ratios[i - 1],
+            _deciding(table, f"period_{i}", linearized),
+            _deciding(table, f"damping_{i}", linearized),
+        )
+        for i in (1, 2)
+    )
     # by the motion of both buildings, and by the error of an estimate
     _, pair_log_std = pair_at_site(table)
-    deviations = screening.linearized_dispersion, screening.model_dispersion
-    at_record = np.where(_linearized(table), *deviations)
+    at_record = np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
     model_log_std = estimate_log_std(table, at_record, screening.interpolation)
     return UncertainMotion(
         first,
         second,
         correlation=_governing_correlation(table),
-        log_std=np.hypot(pair_log_std, np.where(is_exact(table), 0.0, model_log_std)),
+        log_std=np.hypot(pair_log_std, np.where(exact, 0.0, model_log_std)),
         row=nearest_azimuth(station, table),
     )
 
@@ -378,33 +327,14 @@ def is_exact(table: Table) -> BoolArray:
     return np.asarray(table["demand_rule"] == "exact")
 
 
-def _radius(table: Table, i: int, screening: Screening) -> UncertainRadius:
-    """Return the radius of building i at contact height, with its oscillator and uncertainties."""
-    # the median of the estimate over the exact demand is taken off the radius
-    estimate = np.where(_linearized(table), screening.linearized_median, screening.model_median)
-    bias = np.where(is_exact(table), 1.0, estimate)
-    ln_ratio, _ = motion_at_site(table, i)
-    return UncertainRadius(
-        radius=values(table, f"participation_{i}") * _deciding(table, f"per_{i}") / bias,
-        ln_ratio=ln_ratio,
-        period=_deciding(table, f"period_{i}"),
-        damping=_deciding(table, f"damping_{i}"),
-    )
-
-
-def _linearized(table: Table) -> BoolArray:
-    """Return a mask of the pairs whose demand is that of equivalent linear buildings."""
-    return np.asarray(table["demand_rule"] == "linearized")
-
-
-def _deciding(table: Table, name: str) -> FloatArray:
-    """Return a column, with the values of the equivalent buildings where these decide."""
-    return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
-
-
 def _governing_correlation(table: Table) -> FloatArray:
     """Return the correlation that governs the demand."""
-    by_record = np.asarray(table["demand_rule"] == "per_record")
-    elastic = np.where(by_record, table["correlation_record"], table["correlation"])
-    linearized = values(table, "correlation_linearized")
-    return np.where(_linearized(table), linearized, elastic)
+    rule = np.asarray(table["demand_rule"])
+    of_record, linearized = rule == "per_record", rule == "linearized"
+    elastic = np.where(of_record, table["correlation_record"], table["correlation"])
+    return np.where(linearized, table["correlation_linearized"], elastic)
+
+
+def _deciding(table: Table, name: str, linearized: BoolArray) -> FloatArray:
+    """Return a column, with the values of the equivalent buildings where these decide."""
+    return np.where(linearized, values(table, f"equivalent_{name}"), values(table, name))
