@@ -332,7 +332,7 @@ def _governing_correlation(table: Table) -> FloatArray:
     rule = np.asarray(table["demand_rule"])
     of_record, linearized = rule == "per_record", rule == "linearized"
     elastic = np.where(of_record, table["correlation_record"], table["correlation"])
-    return np.where(linearized, table["correlation_linearized"], elastic)
+    return np.where(linearized, values(table, "correlation_linearized"), elastic)
 
 
 def _deciding(table: Table, name: str, linearized: BoolArray) -> FloatArray:
