@@ -13,15 +13,15 @@ import pandas as pd
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion
-from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.population import (
+from per_obspy.screening.population import (
     LARGEST_DAMPING,
     gap_dispersion,
     median_gap,
     one_wall_chance,
 )
-from per_obspy.screening.uncertainty.unknown_gaps import kept_apart
+from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.site_motion import RegionalMotion
+from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.

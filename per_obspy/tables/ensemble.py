@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder, written_whole
-from per_obspy.screening.region.ensemble import (
+from per_obspy.screening.ensemble import (
     SAME,
     SEVERITY,
     ensemble_columns,
@@ -104,7 +104,7 @@ def write_ensemble(
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
-    """Write one row per pair name, in the form for ``screening.region.ensemble_rows``."""
+    """Write one row per pair name, in the form for ``screening.ensemble.ensemble_rows``."""
     tables = list(scenarios.tables.values())
     with bounded_database(path.parent) as database:
         for number, table in enumerate(tables):
