@@ -138,14 +138,7 @@ def _on_rock(model: Coefficients, magnitude: float, distance: FloatArray) -> Flo
 def deviations(
     measure: str, magnitude: float, distance: FloatArray, vs30: FloatArray
 ) -> tuple[float, FloatArray]:
-    """
-    Return the log-standard deviations between earthquakes and within one.
-
-    Parameters
-    ----------
-    measure, magnitude, distance, vs30
-        As for :func:`ln_median`.
-    """
+    """Return log-standard deviations between earthquakes and within one, see :func:`ln_median`."""
     model, _ = MODELS[measure]
     size = (4.5, 5.5)
     between = float(np.interp(magnitude, size, model.between))
@@ -295,16 +288,9 @@ class _Model(NamedTuple):
 
 def peak_deviations(measure: str, peaks: Peaks, earthquake: Earthquake) -> Deviations:
     """
-    Compare a peak of every station with its neighbours and with the earthquake.
+    Compare a peak (``"pga"`` or ``"pgv"``) of every station with its neighbours and the earthquake.
 
-    Parameters
-    ----------
-    measure : str
-        ``"pga"`` or ``"pgv"``.
-    peaks : Peaks
-        Stations; those without a place or peak are left out.
-    earthquake : Earthquake
-        What is known of the source.
+    Stations without a place or peak are left out.
     """
     value = _logarithms(getattr(peaks, measure), peaks.longitude)
     model = _model(measure, peaks, earthquake)

@@ -117,20 +117,11 @@ def assigned(
     pairs: pd.DataFrame, stations: Stations, reach: float
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
-    Assign a station to each pair: index, name and distance; reject pairs without one in reach.
+    Assign a station to each pair: index, name and distance; reject pairs without one in reach, m.
 
-    The station is the nearest one of the pair's site class; where none of these is in reach, or
-    the class of the pair is unknown, the nearest of all. ``other_site_class`` is true where both
+    The station is the nearest one of the pair's site class; where none of these is in reach, or the
+    class of the pair is unknown, the nearest of all. ``other_site_class`` is true where both
     classes are known and differ.
-
-    Parameters
-    ----------
-    pairs : DataFrame
-        With ``pair_id, longitude, latitude``, and ``site_class`` if it is known.
-    stations : Stations
-        Stations with coordinates.
-    reach : float
-        Largest distance, m.
     """
     if not stations.names.size:
         no = pairs.iloc[:0].assign(

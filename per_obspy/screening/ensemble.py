@@ -130,12 +130,8 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     """
     Return the columns of the ensemble table in order, by name.
 
-    Parameters
-    ----------
-    weights : mapping of str to float
-        Weight or rate of each scenario, by its name.
-    yearly : bool
-        Whether weights are rates, 1/year: ``annual_probability`` is a column then.
+    Weights are those of the scenarios, by name, or their rates where ``yearly``, 1/year:
+    ``annual_probability`` is a column then.
     """
     unit = "/year" if yearly else ""
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())

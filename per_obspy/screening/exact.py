@@ -89,20 +89,10 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     """
     Compute exact relative displacements and pounding histories of a block of pairs.
 
-    Parameters
-    ----------
-    station : StationMotion
-        The record.
-    table : Table
-        Completed pairs with their radii along the azimuth, and ``azimuth_used``.
-    azimuth : (n_pairs,) ndarray
-        Of the axis from 1 to 2, degrees; 0 where the station has one horizontal. Pairs whose
-        azimuth is unknown are turned by 180 degrees where the demand is larger there.
-
-    Returns
-    -------
-    dict of (n_pairs,) ndarray
-        ``EXACT_COLUMNS`` and ``azimuth_used``, see ``columns.RESULTS``.
+    ``azimuth`` is that of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
+    Pairs whose azimuth is unknown are turned by 180 degrees where the demand is larger there.
+    ``table`` holds completed pairs with their radii along the azimuth, and ``azimuth_used``.
+    Returns ``EXACT_COLUMNS`` and ``azimuth_used``, (n_pairs,), see ``columns.RESULTS``.
     """
     towards, away, *radii = _without_contact(station, table, azimuth)
     # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one

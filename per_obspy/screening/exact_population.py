@@ -149,22 +149,10 @@ class _Block(NamedTuple):
 
 def record_population(station: StationMotion, table: Table, screening: Screening) -> Columns:
     """
-    Compute the population of every pair at one station.
+    Compute the population of every pair at one station: ``population.COLUMNS``, (n_pairs,).
 
-    Parameters
-    ----------
-    station : StationMotion
-        The record, with its stored spectra.
-    table : Table
-        Rows of the risk table; see :func:`.record_motion`.
-    screening : Screening
-        Medians and log-standard deviations of the estimates.
-
-    Returns
-    -------
-    dict of (n_pairs,) ndarray
-        ``population.COLUMNS``. Where the exact demand decides without uncertain inputs, the
-        results of the exact history.
+    ``table`` holds rows of the risk table, see :func:`.record_motion`. Where the exact demand
+    decides without uncertain inputs, the results are those of the exact history.
     """
     table = only(table, NEEDED)
     exact = is_exact(table)
@@ -285,12 +273,7 @@ def nodes_suffice(demands: FloatArray, gap: FloatArray) -> BoolArray:
     """
     Return where all nodes lie on one side of the gap, with a margin (``BELOW``, ``ABOVE``).
 
-    Parameters
-    ----------
-    demands : (n_pairs, n_nodes) ndarray
-        Medians, m.
-    gap : (n_pairs,) ndarray
-        Median, m.
+    Medians in m: demands (n_pairs, n_nodes), gap (n_pairs,).
     """
     is_below = demands.max(axis=1) * BELOW < gap
     return np.asarray(is_below | (demands.min(axis=1) > ABOVE * gap))
@@ -298,23 +281,13 @@ def nodes_suffice(demands: FloatArray, gap: FloatArray) -> BoolArray:
 
 def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
     """
-    Return the smallest and the largest probability of contact that the nodes can show.
+    Return the smallest and the largest probability of contact that the nodes can show, (n_pairs,).
 
     Of N nodes that all lie below the gap, some of them ``NEAR`` it, contact is not less likely than
     1 / (2 (N + 1)). Of N that all lie above the gap g, the absence of contact is not less likely
     than g / (d (N + 1)), d being the smallest demand: in the mean 1 / (N + 1) of a population lies
     below the smallest of N values, and from there the demand of nearly equal buildings falls evenly
-    to 0.
-
-    Parameters
-    ----------
-    demands, gap
-        As of :func:`nodes_suffice`.
-
-    Returns
-    -------
-    lowest, highest : (n_pairs,) ndarray
-        0 and 1 where nodes lie on both sides of the gap, or far below it.
+    to 0. Both are 0 and 1 where nodes lie on both sides of the gap, or far below it.
     """
     smallest, largest, one_node = (
         demands.min(axis=1),
@@ -330,20 +303,7 @@ def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
 def node_demands(
     station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
 ) -> FloatArray:
-    """
-    Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m.
-
-    Parameters
-    ----------
-    station : StationMotion
-        The record.
-    table : Table
-        Rows of the risk table.
-    nodes : (n_nodes, 6) ndarray
-        As ``nodes.NODES``.
-    screening : Screening
-        For the demand at the site.
-    """
+    """Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m."""
     return _node_motion(_block(station, table, screening), nodes).demand
 
 

@@ -142,25 +142,10 @@ def fitted_group(
     settings: Interpolation,
 ) -> Group:
     """
-    Fit the trend of a group of stations at every period.
+    Fit the trend of a group of stations, averaged per place, at every period of a rising grid, s.
 
-    Parameters
-    ----------
-    stations : Sites
-        Places of the stations.
-    values : (n_stations, n_periods) ndarray
-        ln PER.
-    usable : (n_stations, 2) ndarray
-        Shortest and longest period that each record supports, s.
-    periods : (n_periods,) ndarray
-        Grid, s, rising.
-    settings : Interpolation
-        Assumed deviation and slope, and the case of the spatial correlation.
-
-    Returns
-    -------
-    Group
-        The stations, averaged per place, with their trend.
+    ``values`` are ln PER, (n_stations, n_periods); ``usable`` the shortest and longest period that
+    each record supports, s, (n_stations, 2).
     """
     places, mean, limits = _averaged_by_place(stations, values, usable)
     # Distances from each place to each
@@ -427,23 +412,11 @@ def _checked_grid(stations: Sites, ln_per: ArrayLike, periods: ArrayLike) -> Bot
 
 def motion_at(field: MotionField, places: Sites, period: ArrayLike) -> InterpolatedMotion:
     """
-    Estimate the motion at places from the stations around them.
+    Estimate the motion at places, each at one period, s, from the stations around them.
 
-    Parameters
-    ----------
-    field : MotionField
-        From :func:`fitted_field`.
-    places : Sites
-        Places at which the motion is estimated.
-    period : (n_places,) array_like
-        One for each place, s. Between the grid's periods ln PER is linear in the logarithm of the
-        period.
-
-    Notes
-    -----
-    Stations of a place's site class serve it. Where there is none that supports the period, or
-    the class of the place is unknown while that of a station is known, all stations do and
-    ``fallback`` is true.
+    Between the grid's periods ln PER is linear in the logarithm of the period. Stations of a
+    place's site class serve it. Where there is none that supports the period, or the class of the
+    place is unknown while that of a station is known, all stations do and ``fallback`` is true.
     """
     # Contiguous: functions of NumPy may differ in the last bit between strides
     target = np.ascontiguousarray(

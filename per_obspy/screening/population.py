@@ -24,9 +24,10 @@ constants are those of ``kernels/pairs/node_outcomes.py``, fitted to exact histo
 real records; ``workflows/population_accuracy.py`` has their accuracy in others.
 
 Where the demand is an estimate, by radii of a spectrum, eq. (15) and (16), the motion is given by
-its effect on the pairs (:class:`UncertainMotion`), whether it comes from a record, a ShakeMap or a design spectrum. Periods and dampings are resampled for each building
-separately, with radii from spectra scaled to the median radius. So two buildings of equal height
-are never certain to move as one.
+its effect on the pairs (:class:`UncertainMotion`), whether it comes from a record, a ShakeMap or a
+design spectrum. Periods and dampings are resampled for each building separately, with radii from
+spectra scaled to the median radius. So two buildings of equal height are never certain to move as
+one.
 """
 
 from typing import NamedTuple
@@ -84,23 +85,8 @@ LARGEST_DAMPING = 0.99
 
 def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
     """
-    Return the period of building i at the nodes, s.
-
-    Parameters
-    ----------
-    median : (n_pairs,) ndarray
-        s.
-    table : Table
-        Pairs with ``period_log_std_i``.
-    i : int
-        Building 1 or 2.
-    nodes : (n_nodes, 6) ndarray
-        As ``NODES``.
-
-    Returns
-    -------
-    period : (n_pairs, n_nodes) ndarray
-        s.
+    Return the period of building i, (n_pairs, n_nodes), s, from its median and
+    ``period_log_std_i``.
     """
     deviation = values(table, f"period_log_std_{i}")
     period: FloatArray = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 2]))
@@ -206,16 +192,10 @@ class RelativeMotion(NamedTuple):
 
 def impact_velocity(motion: RelativeMotion, scale: FloatArray, gap: FloatArray) -> FloatArray:
     """
-    Return the largest approach velocity of the impacts, m/s; 0 where the gap is wide enough.
+    Return the largest approach velocity of the impacts, (n_pairs, n_nodes), m/s.
 
-    Parameters
-    ----------
-    motion : RelativeMotion
-        Without contact.
-    scale : ndarray
-        Factor of the motion, dimensionless; shape (n_pairs, n_nodes) or broadcast to it.
-    gap : ndarray
-        m, of the same shape.
+    It is 0 where the gap, m, is wide enough for the motion times ``scale``; both broadcast to its
+    shape.
     """
     shape = motion.demand.shape
     velocity = np.empty(shape)
@@ -254,21 +234,10 @@ class Uncertain(NamedTuple):
 
 def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns:
     """
-    Compute the population of pairs.
+    Compute the population of completed pairs: ``COLUMNS``, each (n_pairs,).
 
-    Parameters
-    ----------
-    uncertain : Uncertain
-        Motion of the pairs.
-    pairs : Table
-        Completed pairs with gap, its deviation, contact masses and restitution.
-    nodes : (n_nodes, 6) ndarray
-        Nodes of the motion.
-
-    Returns
-    -------
-    dict of (n_pairs,) ndarray
-        ``COLUMNS``: from 0 to 1; m/s; m/s; dimensionless, at least 1.
+    Probabilities from 0 to 1, velocities in m/s, amplifications of at least 1. ``nodes`` are those
+    of the motion, (n_nodes, 6), as ``NODES``.
     """
     shape = uncertain.log_std.size, len(nodes)
     facts = np.stack(
@@ -295,14 +264,8 @@ def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) ->
     """
     Return the mean over the nodes of the chance that a demand exceeds an uncertain gap.
 
-    Parameters
-    ----------
-    demands : (n_pairs, n_nodes) ndarray
-        Medians, m.
-    log_std : (n_pairs,) ndarray
-        Log-standard deviation of every demand.
-    table : Table
-        With gap and its deviation.
+    ``demands`` are medians, (n_pairs, n_nodes), m; ``log_std`` is the log-standard deviation of all
+    demands of a pair.
     """
     chances = np.empty(log_std.size)
     deviation = np.hypot(gap_dispersion(table), log_std)
@@ -382,21 +345,10 @@ class UncertainMotion(NamedTuple):
 
 def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Table) -> Columns:
     """
-    Compute the population of pairs under an uncertain motion.
+    Compute the population of completed pairs under an uncertain motion: ``COLUMNS``.
 
-    Parameters
-    ----------
-    motion : UncertainMotion
-        Of the pairs.
-    spectra : LogSpectra
-        By which the radii of resampled oscillators change; at the edge beyond the grid.
-    pairs : Table
-        Completed pairs with their log-standard deviations.
-
-    Returns
-    -------
-    dict of (n_pairs,) ndarray
-        ``population.COLUMNS``.
+    ``spectra`` are those by which the radii of resampled oscillators change; at the edge beyond the
+    grid.
     """
     count = motion.row.size
     result: Columns = {name: np.empty(count) for name in COLUMNS}
@@ -415,16 +367,7 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
 def estimated_motion(
     motion: UncertainMotion, spectra: LogSpectra, pairs: Table, nodes: FloatArray
 ) -> RelativeMotion:
-    """
-    Estimate the motion of pairs without contact at nodes of their buildings.
-
-    Parameters
-    ----------
-    motion, spectra, pairs : UncertainMotion, LogSpectra, Table
-        See :func:`estimated_population`.
-    nodes : (n_nodes, 6) ndarray
-        As ``nodes.NODES``.
-    """
+    """Estimate the motion of pairs without contact at nodes (n_nodes, 6) of their buildings."""
     first = _oscillators(motion.first, motion.row, spectra, pairs, 1)
     second = _oscillators(motion.second, motion.row, spectra, pairs, 2)
     # eq. (16), shifted as that which governs at the medians

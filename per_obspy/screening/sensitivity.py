@@ -71,19 +71,9 @@ def input_sensitivity(
     """
     Return how the chance of contact depends on each uncertain input of some pairs.
 
-    Parameters
-    ----------
-    rows : DataFrame
-        Rows of the risk table with all columns.
-    ground : RegionalMotion
-        The ground motion with which they were computed.
-    building, screening : Building, Screening
-        The settings with which they were computed.
-
-    Returns
-    -------
-    list of Sensitivity
-        None of a pair without probability, or whose row cannot be computed again from its columns.
+    Rows of the risk table have all columns; ground and settings are those with which they were
+    computed. None of a pair without probability, or whose row cannot be computed again from its
+    columns.
     """
     known = rows[rows["probability"].notna()].reset_index(drop=True)
     inputs = {name: ends for name, ends in _ends(known).items() if ends[2].any()}

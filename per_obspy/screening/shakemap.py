@@ -151,26 +151,11 @@ def shakemap_rows(
     """
     Compute the rows of pairs that no station serves, and the rejections of those outside the map.
 
-    Parameters
-    ----------
-    shakemap : Dataset
-        From :func:`per_obspy.records.shakemap.read_shakemap`.
-    pairs : DataFrame
-        Completed pairs.
-    screening : Screening
-        Thresholds, risk classes and the region's values for code rules.
-    unreached : sequence of Rejection
-        Why no station serves them: reasons that come first.
-
-    Returns
-    -------
-    rows : DataFrame
-        Not ranked, with the columns of :func:`~per_obspy.screening.risk.risk_rows`; those that need
-        a record (``per_1``, ``impacts``, ``station``, ...) are empty. ``demand_rule`` is
-        ``shakemap``.
-    rejected : tuple of Rejection
-        Pairs outside the map, without motion there, or with a period outside the map's, each with
-        the value.
+    Rows of completed pairs are not ranked, and have the columns of
+    :func:`~per_obspy.screening.risk.risk_rows`; those that need a record (``per_1``, ``impacts``,
+    ``station``, ...) are empty, ``demand_rule`` is ``shakemap``. Pairs outside the map, without
+    motion there, or with a period outside the map's are rejected with the value, after the reasons
+    why no station serves them (``unreached``).
     """
     reasons = _reasons_outside(shakemap, pairs)
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")

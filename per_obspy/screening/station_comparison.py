@@ -72,19 +72,9 @@ def compare_stations(
     stations: Sequence[xr.Dataset], earthquake: Earthquake
 ) -> dict[str, Comparison]:
     """
-    Compare the stations of an earthquake with each other.
+    Compare the stations of an earthquake with each other; their motion is not needed.
 
-    Parameters
-    ----------
-    stations : sequence of Dataset
-        From :func:`per_obspy.station_spectra`; the motion is not needed.
-    earthquake : Earthquake
-        What is known of the source.
-
-    Returns
-    -------
-    dict
-        Name -> what is said of the station; of others nothing is said.
+    Returns what is said of a station, by its name; of others nothing is said.
     """
     names = [str(station["station"].item()) for station in stations]
     peaks = _peaks(stations)

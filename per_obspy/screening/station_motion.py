@@ -65,21 +65,10 @@ def stored_log(
     spectra: LogSpectra, row: IndexArray, log_period: FloatArray, log_damping: FloatArray
 ) -> FloatArray:
     """
-    Interpolate stored logarithms at (ln period, ln damping); constant beyond the grid.
+    Interpolate stored logarithms at rows of azimuths, ln period and ln damping.
 
-    Parameters
-    ----------
-    spectra : LogSpectra
-        The grid.
-    row : ndarray of int
-        Of the azimuth.
-    log_period, log_damping : ndarray
-        Of the shape of the rows, or broadcast to it.
-
-    Returns
-    -------
-    stored : ndarray
-        ln PER or ln SD in m, bilinear on the logarithmic axes.
+    Arrays broadcast; the result is ln PER or ln SD in m, bilinear on the logarithmic axes and
+    constant beyond the grid.
     """
     periods, dampings, radii = spectra
     # cell of the grid and position in it, along either axis
@@ -147,14 +136,7 @@ class StationMotion(NamedTuple):
 
 
 def station_motion(station: xr.Dataset) -> StationMotion:
-    """
-    Decode the Dataset of one station, once for all its pairs.
-
-    Parameters
-    ----------
-    station : Dataset
-        From :func:`per_obspy.station_spectra`.
-    """
+    """Decode the Dataset of one station, once for all its pairs."""
     north, east, dt = components(station)
     horizontals = station.sizes["horizontal"]
     # the azimuth of the sensor is used of a single horizontal only

@@ -238,15 +238,8 @@ def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str])
     """
     Count the pairs of every area in a piece of a risk table, to be joined by :func:`joined_totals`.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Piece of a risk table; with a column ``probability`` there are expected numbers, of the
-        pairs that have one.
-    area : (n_pairs,) array_like of str
-        Area or cell of each pair.
-    classes : iterable of str
-        Names of the risk classes.
+    ``area`` is the area or cell of each pair, ``classes`` the names of the risk classes; with a
+    column ``probability`` there are expected numbers, of the pairs that have one.
     """
     rows = table.assign(area=np.asarray(area, dtype=object))
     # Truth values and ones, which are summed up to numbers of pairs

@@ -49,11 +49,7 @@ def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
     """
     Return completed pairs with a substitute for unknown gaps, and the columns ``MARKS``.
 
-    Parameters
-    ----------
-    pairs : DataFrame
-        From :func:`per_obspy.inventory.completion.completed_pairs`; the gap is NaN where neither
-        the pair table nor the configuration gives one.
+    The gap is NaN where neither the pair table nor the configuration gives one.
     """
     unknown = np.isnan(values(pairs, "gap"))
     derived = pairs["derived"].tolist()
@@ -65,14 +61,7 @@ def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
 
 
 def without_gap(table: pd.DataFrame) -> pd.DataFrame:
-    """
-    Empty the columns that depend on an unknown gap, and drop the columns ``MARKS``.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Rows of the pairs that :func:`kept_apart` returned.
-    """
+    """Empty the columns that depend on an unknown gap, and drop the columns ``MARKS``."""
     unknown = table["unknown_gap"].to_numpy(bool)
     emptied = unknown & ~table["assumed_gap"].to_numpy(bool)
     table = table.drop(columns=list(MARKS))

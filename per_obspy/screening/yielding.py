@@ -113,19 +113,10 @@ def linearized_columns(station: StationMotion, table: Table) -> Columns:
 
 def governing(table: Table, name: str) -> Both:
     """
-    Return a property of the two oscillators that govern the estimated demand.
+    Return a property (one of ``EQUIVALENT``) of the oscillators that govern the estimated demand.
 
-    Parameters
-    ----------
-    table : Table
-        Rows with ``estimate_rule`` and the columns of :func:`linearized_columns`.
-    name : str
-        One of ``EQUIVALENT``.
-
-    Returns
-    -------
-    first, second : (n_pairs,) ndarray
-        Of the equivalent linear buildings where their gap governs, else of the elastic ones.
+    They are the equivalent linear buildings where their gap governs (``estimate_rule``), else the
+    elastic ones.
     """
     linearized = np.asarray(table["estimate_rule"] == "linearized")
     equivalent_1, equivalent_2 = both(table, f"equivalent_{name}")
