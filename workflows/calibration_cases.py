@@ -13,14 +13,14 @@ from per_obspy import pounding_histories, process, station_spectra
 from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Interpolation, Scenario, Screening, Simulation, load
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
-from per_obspy.screening.ground_motion.field import great_circle, residual_correlation
-from per_obspy.screening.ground_motion.site_motion import (
+from per_obspy.screening.assignment import nearest_station, stations_of
+from per_obspy.screening.motion_field import great_circle, residual_correlation
+from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.site_motion import (
     Hypocentre,
     RegionalMotion,
     prepared_field,
 )
-from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.values import both, values
 from per_obspy.simulation.buildings import simulated_pairs
 from per_obspy.simulation.earthquake import GAIN, simulate

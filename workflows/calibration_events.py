@@ -17,7 +17,7 @@ from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.stations import finished_stations, station_jobs
 from per_obspy.records.sources import find_sources
 from per_obspy.records.text_table import read_columns
-from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE, Hypocentre, hypocentre_of
+from per_obspy.screening.site_motion import HYPOCENTRE, Hypocentre, hypocentre_of
 from per_obspy.spectra.storage import read_spectra
 
 #: Folders of one earthquake whose records are in two formats: stations of the second that the

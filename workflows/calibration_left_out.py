@@ -10,15 +10,15 @@ from calibration_events import RealEvent
 
 from per_obspy.config import Building, Screening
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.screening.by_record.station_motion import station_motion
-from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import (
+from per_obspy.screening.assignment import stations_of
+from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.site_motion import (
     RegionalMotion,
     hypocentre_of,
     prepared_field,
 )
-from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.motion import median_at_site, site_demand
+from per_obspy.screening.station_motion import station_motion
+from per_obspy.screening.uncertain_motion import median_at_site, site_demand
 from per_obspy.screening.values import values
 
 #: Periods whose pairs are screened, s: shortest, longest, number.

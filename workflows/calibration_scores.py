@@ -8,7 +8,7 @@ from calibration_cases import APART, KINDS, PLACES, YIELDING
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.reliability import summary
-from per_obspy.screening.region.evaluation import brier_score, reliability
+from per_obspy.screening.evaluation import brier_score, reliability
 
 #: A probability is sharp below it and above 1 - it.
 SHARP = 0.1

@@ -23,7 +23,7 @@ from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.stations import finished_stations, station_jobs
 from per_obspy.records.sources import find_sources
-from per_obspy.screening.ground_motion.amplitudes import (
+from per_obspy.screening.amplitudes import (
     FLAGGED,
     MEASURES,
     REJECTED,

@@ -25,7 +25,7 @@ from per_obspy.inventory.checking import checked_pairs
 from per_obspy.kernels.pairs.node_outcomes import QUANTILE
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.text_table import read_columns
-from per_obspy.screening.uncertainty.population import COLUMNS, gap_dispersion, median_gap
+from per_obspy.screening.population import COLUMNS, gap_dispersion, median_gap
 
 #: Folders of records: events by which the loss of ``severity.py`` was fitted, and others.
 FITTED = ("mexico1985_sct", "maule2010_renadic", "aomori2018_knet")

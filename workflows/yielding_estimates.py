@@ -17,8 +17,8 @@ from paper_records import CHECKOUT, data_folder
 from per_obspy import process, station_spectra
 from per_obspy.config import Simulation, load
 from per_obspy.records.text_table import read_columns
-from per_obspy.screening.by_record.estimates import demand_columns
-from per_obspy.screening.by_record.station_motion import motion_along_azimuths, station_motion
+from per_obspy.screening.estimates import demand_columns
+from per_obspy.screening.station_motion import motion_along_azimuths, station_motion
 from per_obspy.screening.values import Columns
 from per_obspy.simulation.earthquake import simulate
 

@@ -143,7 +143,7 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.inputs.extras import require_extras
-    from per_obspy.screening.by_spectrum.design import design_table, read_design_spectrum
+    from per_obspy.screening.design import design_table, read_design_spectrum
 
     # Screen
     settings = in_language(load(configuration, Design), language)

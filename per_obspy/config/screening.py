@@ -88,7 +88,7 @@ class Building(Section):
 
 
 class Interpolation(Section):
-    """Estimation of the motion between stations (``screening/ground_motion/kriging.py``)."""
+    """Estimation of the motion between stations (``screening/motion_field.py``)."""
 
     log_std: float = Field(
         0.6,

@@ -15,9 +15,9 @@ from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
 from per_obspy.jobs.parallel import Work, Workers
 from per_obspy.jobs.parts import Part, do_parts, record_part, rows_hash
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
-from per_obspy.screening.rows import risk_rows
+from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.site_motion import RegionalMotion
 from per_obspy.tables.parts import write_part
 
 #: Rows of a chunk at most: a worker needs about 10 kB for each.

@@ -13,8 +13,8 @@ from per_obspy.errors import MachineFault, Rejection
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
-from per_obspy.screening.ground_motion.site_motion import (
+from per_obspy.screening.assignment import Stations, site_class_of
+from per_obspy.screening.site_motion import (
     RegionalMotion,
     StationField,
     hypocentre_of,

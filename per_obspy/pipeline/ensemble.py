@@ -35,7 +35,7 @@ from per_obspy.pipeline.results.table_report import report_ensemble
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
-from per_obspy.screening.region.ensemble import (
+from per_obspy.screening.ensemble import (
     SAME,
     SEVERITY,
     ensemble_columns,
@@ -128,7 +128,7 @@ def write_ensemble(
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
-    """Write one row per pair name, in the form for ``screening.region.ensemble_rows``."""
+    """Write one row per pair name, in the form for ``screening.ensemble_rows``."""
     tables = list(scenarios.tables.values())
     with bounded_database(path.parent) as database:
         for number, table in enumerate(tables):

@@ -14,7 +14,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.cells import plain_numbers
 from per_obspy.inventory.files.headings import IDENTIFIER
 from per_obspy.inventory.files.raw_rows import RawRows
-from per_obspy.screening.region.totals import grid_cells
+from per_obspy.screening.totals import grid_cells
 from per_obspy.tables.coverage import Search, search_of_table
 from per_obspy.tables.totals import areas_of
 

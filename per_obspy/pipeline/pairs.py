@@ -18,7 +18,7 @@ from per_obspy.inventory.catalogue import (
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.jobs.ground_files import StationFile
 from per_obspy.pipeline.inputs.drawn_pairs import pair_table
-from per_obspy.screening.ground_motion.assignment import nearest_station
+from per_obspy.screening.assignment import nearest_station
 from per_obspy.simulation.buildings import simulated_pairs
 
 

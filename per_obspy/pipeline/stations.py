@@ -24,9 +24,9 @@ from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
-from per_obspy.screening.ground_motion.amplitudes import Earthquake
-from per_obspy.screening.ground_motion.site_motion import hypocentre_of
-from per_obspy.screening.ground_motion.station_comparison import Comparison, compare_stations
+from per_obspy.screening.amplitudes import Earthquake
+from per_obspy.screening.site_motion import hypocentre_of
+from per_obspy.screening.station_comparison import Comparison, compare_stations
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
 #: Stations that a message names.

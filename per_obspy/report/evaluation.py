@@ -12,7 +12,7 @@ from scipy.stats import binom
 
 from per_obspy.files import written_whole
 from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, MOTION_COLOUR, save
-from per_obspy.screening.region.evaluation import Evaluation, evaluation
+from per_obspy.screening.evaluation import Evaluation, evaluation
 
 
 def write_evaluation(risk: pd.DataFrame, folder: Path, simulated: bool) -> list[Path]:

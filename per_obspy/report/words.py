@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
-from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -103,8 +103,10 @@ def _height_gaps(pairs: pd.DataFrame, codes: Codes) -> Columns:
     lower = np.minimum(*both(pairs, "height"))
     step = np.nan if codes.gb_intensity is None else GB_STEP[codes.gb_intensity]
     # the larger factor of both systems, 100 mm at least; a NaN, an unknown factor, stays
-    systems = (pairs[f"system_{i}"].map(GB_FACTOR).astype(np.float64) for i in (1, 2))
-    frames = np.maximum(*systems).to_numpy() * (0.1 + 0.02 * _started_steps(lower - 15.0, step))
+    factor_1, factor_2 = (
+        np.asarray(pairs[f"system_{i}"].map(GB_FACTOR), dtype=np.float64) for i in (1, 2)
+    )
+    frames = np.maximum(factor_1, factor_2) * (0.1 + 0.02 * _started_steps(lower - 15.0, step))
     simplified = _by_zone(pairs, codes, NTC_SIMPLIFIED) * values(pairs, "contact_height")
     return {
         "ntc2004_simplified": _halved(pairs, codes) * 2.0 * np.maximum(0.05, simplified),

@@ -102,8 +102,7 @@ def record_flags(station: xr.Dataset) -> list[str]:
 def _outside_usable_periods(table: Table, station: xr.Dataset) -> BoolArray:
     """Return a mask of pairs with a period outside the usable periods of the record."""
     periods = np.stack(both(table, "period"))
-    shortest = number(station, "shortest_usable_period")
-    longest = number(station, "longest_usable_period")
+    shortest, longest = (number(station, f"{end}_usable_period") for end in ("shortest", "longest"))
     return np.asarray(((periods < shortest) | (periods > longest)).any(axis=0))
 
 

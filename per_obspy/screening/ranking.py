@@ -96,16 +96,8 @@ def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> TextArr
 
 def in_order(table: pd.DataFrame) -> pd.DataFrame:
     """
-    Sort pairs, worst first, and add the sort columns ``KEYS``.
+    Sort pairs with their population, worst first, and add the sort columns ``KEYS``.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Pairs with their population: ``expected_impact_velocity``, ``expected_amplification`` and
-        ``probability``.
-
-    Notes
-    -----
     The order is by expected impact velocity, then by expected amplification; ties are broken by
     probability, importance, occupants and at last the name, so that it does not depend on the order
     in which pairs were computed. Pairs without a probability, because their gap is unknown, follow

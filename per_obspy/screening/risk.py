@@ -1,21 +1,205 @@
-"""Risk table of an inventory that fits in memory: one row per pair, worst first."""
+"""
+Rows of the risk table, not ranked yet, and the table of an inventory that fits in memory.
 
-from collections.abc import Iterable, Sequence
+A row depends on its pair, its station and the settings, and on no other row.
+"""
 
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
 import pandas as pd
 import xarray as xr
+from pandas.api.types import is_numeric_dtype
 
 from per_obspy.config import Building, Screening
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import check_columns
-from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import (
+from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.suspicions import ODD
+from per_obspy.screening.assignment import assigned, stations_of
+from per_obspy.screening.codes import code_columns, rule_columns
+from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
+from per_obspy.screening.estimates import demand_columns
+from per_obspy.screening.exact import exact_decides, furthest_azimuth
+from per_obspy.screening.exact_population import record_population
+from per_obspy.screening.flags import (
+    joined_flags,
+    raised_by_pairs,
+    raised_by_record,
+)
+from per_obspy.screening.mitigation import mitigation_columns
+from per_obspy.screening.ranking import KEYS, state_columns, worst_first
+from per_obspy.screening.shakemap import shakemap_rows
+from per_obspy.screening.site_motion import (
     RegionalMotion,
     hypocentre_of,
+    motion_at_pairs,
     prepared_field,
 )
-from per_obspy.screening.ranking import worst_first
-from per_obspy.screening.rows import risk_rows
+from per_obspy.screening.station_motion import (
+    PairMotion,
+    StationMotion,
+    motion_along_azimuths,
+    motion_along_every_azimuth,
+    motion_of_one_horizontal,
+    station_motion,
+)
+from per_obspy.screening.unknown_gaps import kept_apart, without_gap
+from per_obspy.screening.values import Columns, IndexArray, at_contact, chosen, joined, values
+from per_obspy.spectra.station import lacks_azimuths
+
+#: Columns that other columns are computed from and that are dropped at the end; flags report what
+#: a reader must know of them.
+INTERMEDIATE = (
+    "station_index",
+    "other_site_class",
+    "linearized_converged",
+    "motion_from_other_site_class",
+    *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
+)
+
+#: Pairs of unknown azimuth that are computed together: at 180 azimuths every array of theirs stays
+#: below 3 MB.
+BLOCK = 2000
+
+
+def risk_rows(
+    pairs: pd.DataFrame, ground: RegionalMotion, building: Building, screening: Screening
+) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """
+    Compute one row per pair, in no particular order, and the rejections of pairs out of reach.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        From :func:`per_obspy.read_pairs`, or some rows of it; its columns named as results are
+        replaced.
+    ground : RegionalMotion
+        The ground motion; only stations that serve a pair are read.
+    building, screening : Building, Screening
+        Assumptions for missing values; thresholds.
+
+    Returns
+    -------
+    rows : DataFrame
+        Columns in the order of ``screening.columns.ORDER`` without ``rank``, then the other columns
+        of the pair table.
+    rejected : tuple of Rejection
+        Pairs that neither a station nor the map serves.
+    """
+    complete = kept_apart(completed_pairs(_without_results(pairs), building))
+    placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
+    tables = []
+    if len(placed):
+        tables.append(_rows_at_stations(placed.reset_index(drop=True), ground, screening))
+    # pairs without a station in reach fall back on the map
+    if ground.shakemap is not None and rejected:
+        rest = complete[complete["pair_id"].isin([rejection.name for rejection in rejected])]
+        mapped, rejected = shakemap_rows(ground.shakemap, rest, screening, rejected)
+        tables += [mapped] if len(mapped) else []
+    if not tables:
+        return _ordered(placed.reindex(columns=[*ORDER])), rejected
+    return _ordered(without_gap(pd.concat(tables, ignore_index=True))), rejected
+
+
+def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return the pairs without columns of results: an earlier risk table may be the pair table."""
+    flags = {f"raised_{flag}" for flag in FLAGS}
+    results = {*RESULTS, *rule_columns(), *INTERMEDIATE, *KEYS, *flags}
+    return pairs.drop(columns=[name for name in pairs if name in results])
+
+
+def _rows_at_stations(
+    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening
+) -> pd.DataFrame:
+    """Return the rows of pairs that have a station."""
+    index = pairs["station_index"].to_numpy(np.int64)
+    if ground.field is not None:
+        pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, index))
+    # as arrays: records need no other columns than these
+    known: Columns = {}
+    for name in pairs:
+        if name == "derived" or is_numeric_dtype(pairs[name]):
+            known[str(name)] = pairs[name].to_numpy()
+    # one station after the other
+    parts = []
+    for number in np.unique(index).tolist():
+        rows = np.flatnonzero(index == number)
+        block = chosen(known, rows)
+        parts.append((rows, _record_columns(ground.stations.read(number), block, screening)))
+    # All at once: columns that are inserted one by one fragment a table
+    columns = pd.DataFrame(joined(parts), index=pairs.index)
+    return _with_states_and_flags(pd.concat([pairs, columns], axis=1), screening)
+
+
+def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
+    """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
+    station = station_motion(dataset)
+    given = pairs
+    # No azimuth of a pair is one of sensors that point nobody knows where
+    if lacks_azimuths(dataset):
+        pairs = pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
+    # demand, by groups of pairs whose azimuth is found alike
+    parts = []
+    for rows, motion, azimuth_rule in _motions(station, pairs, screening.exact):
+        group = chosen(pairs, rows)
+        demands = demand_columns(station, group, motion, azimuth_rule, screening.exact)
+        parts.append((rows, demands))
+    table = joined(parts)
+    # measures, flags and population follow from the demand
+    table |= mitigation_columns(station, table, screening.target_amplification)
+    raised = raised_by_record(table, dataset, screening)
+    table |= record_population(station, table, screening)
+    table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
+    return {name: column for name, column in table.items() if name not in given}
+
+
+def _motions(
+    station: StationMotion, pairs: Columns, exact: bool
+) -> Iterator[tuple[IndexArray, PairMotion, str]]:
+    """Yield rows of pairs with their motion and the rule by which their azimuth is found."""
+    azimuth = values(pairs, "azimuth")
+    if station.horizontals == 1:
+        yield np.arange(azimuth.size), motion_of_one_horizontal(station, pairs), "station"
+        return
+    unknown, decides = np.isnan(azimuth), exact & exact_decides(station, pairs)
+    given = np.flatnonzero(~unknown)
+    if given.size:
+        motion = motion_along_azimuths(station, chosen(pairs, given), azimuth[given])
+        yield given, motion, "given"
+    # unknown azimuth where the exact demand decides: the axis that the record makes worst
+    worst = np.flatnonzero(unknown & decides)
+    if worst.size:
+        block = chosen(pairs, worst)
+        yield (
+            worst,
+            motion_along_azimuths(station, block, furthest_azimuth(station, block)),
+            "worst",
+        )
+    # unknown azimuth where an estimate decides: every azimuth
+    worst = np.flatnonzero(unknown & ~decides)
+    for first in range(0, worst.size, BLOCK):
+        rows = worst[first : first + BLOCK]
+        yield rows, motion_along_every_azimuth(station, chosen(pairs, rows)), "worst"
+
+
+def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return the table with all columns that need no record: state, class, flags, code rules."""
+    table = table.assign(**state_columns(table, screening))
+    # flags of the record and of the pairs, joined to one text
+    by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}
+    raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}
+    flags = joined_flags(raised_by_pairs(table) | raised)
+    rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
+    dropped = [*INTERMEDIATE, *by_record.values(), *(name for name in table if name == ODD)]
+    return table.drop(columns=dropped).assign(flags=flags).join(rules)
+
+
+def _ordered(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the leading columns in their order, then the others."""
+    first = [name for name in ORDER if name != "rank"]
+    return table[[*first, *(name for name in table if name not in ORDER)]]
+
 
 #: Defaults of the configuration.
 BUILDING, SCREENING = Building(), Screening()

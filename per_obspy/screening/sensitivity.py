@@ -13,15 +13,15 @@ import pandas as pd
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion
-from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.population import (
+from per_obspy.screening.population import (
     LARGEST_DAMPING,
     gap_dispersion,
     median_gap,
     one_wall_chance,
 )
-from per_obspy.screening.uncertainty.unknown_gaps import kept_apart
+from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.site_motion import RegionalMotion
+from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
@@ -71,19 +71,9 @@ def input_sensitivity(
     """
     Return how the chance of contact depends on each uncertain input of some pairs.
 
-    Parameters
-    ----------
-    rows : DataFrame
-        Rows of the risk table with all columns.
-    ground : RegionalMotion
-        The ground motion with which they were computed.
-    building, screening : Building, Screening
-        The settings with which they were computed.
-
-    Returns
-    -------
-    list of Sensitivity
-        None of a pair without probability, or whose row cannot be computed again from its columns.
+    Rows of the risk table have all columns; ground and settings are those with which they were
+    computed. None of a pair without probability, or whose row cannot be computed again from its
+    columns.
     """
     known = rows[rows["probability"].notna()].reset_index(drop=True)
     inputs = {name: ends for name, ends in _ends(known).items() if ends[2].any()}

@@ -73,28 +73,19 @@ def _rows() -> None:
     """Compile the kernels of histories of rows of buildings."""
     # Three buildings in touch that yield
     ones = np.ones(3)
-    row = BuildingRows(
-        first=np.array([0, 3]),
-        period=np.array([0.5, 0.7, 0.6]),
-        damping=0.05 * ones,
-        mass=ones,
-        yield_displacement=0.02 * ones,
-        hardening=0.05 * ones,
-        participation_left=ones,
-        participation_right=ones,
-        gap=0.0 * ones,
-        restitution=0.65 * ones,
-        azimuth=np.zeros(1),
-    )
+    period = np.array([0.5, 0.7, 0.6])
+    stiffness = 0.02 * ones, 0.05 * ones
+    sides = ones, ones, 0.0 * ones, 0.65 * ones
+    row = BuildingRows(np.array([0, 3]), period, 0.05 * ones, ones, *stiffness, *sides, np.zeros(1))
     row_maxima(PULSE, PULSE, INTERVAL, row)
 
 
 def _relative() -> None:
     """Compile the kernels of relative displacements, correlations and maxima along azimuths."""
-    pair = [0.5], [0.05], [0.7], [0.05], [0.0]
-    directional_relative_displacement(PULSE, PULSE, INTERVAL, *pair)
-    worst_azimuth(PULSE, PULSE, INTERVAL, *pair[:4], [1.0], [1.0])
-    azimuth_maxima(PULSE, PULSE, INTERVAL, [0.5], [0.05], [0.0])
+    motion, pair = (PULSE, PULSE, INTERVAL), ([0.5], [0.05], [0.7], [0.05], [0.0])
+    directional_relative_displacement(*motion, *pair)
+    worst_azimuth(*motion, *pair[:4], [1.0], [1.0])
+    azimuth_maxima(*motion, [0.5], [0.05], [0.0])
 
 
 def _spectra() -> None:

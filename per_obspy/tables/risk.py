@@ -19,9 +19,9 @@ from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.inventory.suspicions import ODD
-from per_obspy.screening.by_spectrum.design import DESIGN
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.design import DESIGN
 from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, text_columns
 from per_obspy.tables.ranked_cells import count_values
 from per_obspy.tables.ranked_table import ROWS, RankedTable, ranked_table
@@ -176,7 +176,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     Parameters
     ----------
     table : DataFrame
-        From :func:`per_obspy.screening.by_spectrum.design.design_table`.
+        From :func:`per_obspy.screening.design.design_table`.
     folder : Path
         Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """

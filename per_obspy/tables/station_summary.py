@@ -12,7 +12,7 @@ import xarray as xr
 from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.flags import record_flags
-from per_obspy.screening.ground_motion.field import great_circle
+from per_obspy.screening.motion_field import great_circle
 from per_obspy.spectra.station import lacks_azimuths
 from per_obspy.tables.table_files import rounded_table, write_csv, write_described
 

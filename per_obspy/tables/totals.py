@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
-from per_obspy.screening.region.totals import (
+from per_obspy.screening.totals import (
     PartialTotals,
     box_outlines,
     grid_cells,
@@ -47,7 +47,7 @@ class RegionTotals(NamedTuple):
     Attributes
     ----------
     table : DataFrame
-        One row per area: see :func:`per_obspy.screening.region.totals.totals`.
+        One row per area: see :func:`per_obspy.screening.totals.totals`.
     outlines : list of ndarray or None
         Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
         for named areas, whose outline is unknown.

@@ -28,9 +28,9 @@ from screening import RECORDS, SCENARIO, measured
 from per_obspy.config import Building, Screening, Simulation, load
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.exact import exact_outcome, furthest_azimuth
-from per_obspy.screening.by_record.station_motion import StationMotion, station_motion
-from per_obspy.screening.ground_motion.assignment import Stations, assigned, stations_of
+from per_obspy.screening.assignment import Stations, assigned, stations_of
+from per_obspy.screening.exact import exact_outcome, furthest_azimuth
+from per_obspy.screening.station_motion import StationMotion, station_motion
 from per_obspy.screening.values import Columns
 from per_obspy.simulation.buildings import simulated_pairs
 from per_obspy.spectra.storage import read_spectra

@@ -60,7 +60,7 @@ from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.seedlink import ServerAddress, seedlink_window
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.by_spectrum.design import read_design_spectrum
+from per_obspy.screening.design import read_design_spectrum
 
 #: Small files of other formats among the test data of ObsPy.
 OBSPY_FORMATS = {

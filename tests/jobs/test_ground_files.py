@@ -12,7 +12,7 @@ from per_obspy.errors import MachineFault
 from per_obspy.files import file_hash
 from per_obspy.jobs.ground_files import ground_files, read_ground, read_station_once
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE, prepared_field
+from per_obspy.screening.site_motion import HYPOCENTRE, prepared_field
 from per_obspy.spectra.station import station_spectra
 from per_obspy.spectra.storage import read_spectra, without_motion, write_spectra
 

@@ -12,7 +12,7 @@ from per_obspy.jobs.parallel import Workers
 from per_obspy.pipeline.process import process_records
 from per_obspy.processing.chain import process_station
 from per_obspy.records.sources import find_sources
-from per_obspy.screening.ground_motion.site_motion import hypocentre_of, prepared_field
+from per_obspy.screening.site_motion import hypocentre_of, prepared_field
 from per_obspy.spectra.station import station_spectra
 from per_obspy.tables.station_summary import station_table
 

@@ -14,7 +14,7 @@ from per_obspy.jobs import chunk
 from per_obspy.pipeline.results.shown_pair import find_pair
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.pipeline.screening import SMALLEST_CHUNK, _chunk_rows
-from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
+from per_obspy.screening.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
 from .small_run import SPECTRA, InProcess, page_content, real_reports, write_configuration

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from per_obspy.report.evaluation import _draw_shares, draw_reliability, write_evaluation
-from per_obspy.screening.region.evaluation import evaluation
+from per_obspy.screening.evaluation import evaluation
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import pytest
 from screening_samples import make_station
 
-from per_obspy.screening.by_record.station_motion import station_motion
+from per_obspy.screening.station_motion import station_motion
 
 
 @pytest.fixture(scope="session")

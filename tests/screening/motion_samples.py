@@ -3,7 +3,7 @@
 import numpy as np
 
 from per_obspy.config import Interpolation
-from per_obspy.screening.ground_motion.field import InterpolatedMotion, fitted_field, motion_at
+from per_obspy.screening.motion_field import InterpolatedMotion, fitted_field, motion_at
 
 SETTINGS = Interpolation()
 EVERY_PERIOD = (0.0, np.inf)

@@ -9,8 +9,8 @@ import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.estimates import demand_columns
-from per_obspy.screening.by_record.station_motion import motion_along_azimuths, station_motion
+from per_obspy.screening.estimates import demand_columns
+from per_obspy.screening.station_motion import motion_along_azimuths, station_motion
 from per_obspy.screening.values import values
 
 

@@ -10,10 +10,10 @@ from shakemap_samples import make_map
 import per_obspy
 from per_obspy.config import Building, Screening
 from per_obspy.inventory.completion import completed_pairs
+from per_obspy.screening.assignment import stations_of
 from per_obspy.screening.columns import ORDER, RESULTS
-from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion, prepared_field
-from per_obspy.screening.rows import INTERMEDIATE, risk_rows
+from per_obspy.screening.risk import INTERMEDIATE, risk_rows
+from per_obspy.screening.site_motion import RegionalMotion, prepared_field
 
 
 def _rows(pairs, *stations, shakemap=None):
@@ -81,7 +81,7 @@ def test_a_row_does_not_depend_on_the_others(station, monkeypatch):
     for row in rows[::2]:
         row["period_2"] = np.nan
     together, _ = _rows(make_pairs(rows), station)
-    monkeypatch.setattr("per_obspy.screening.rows.BLOCK", 2)
+    monkeypatch.setattr("per_obspy.screening.risk.BLOCK", 2)
     blocks, _ = _rows(make_pairs(rows), station)
     pd.testing.assert_frame_equal(blocks, together, check_exact=True)
 

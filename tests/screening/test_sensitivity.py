@@ -6,13 +6,13 @@ from screening_samples import make_pairs
 
 import per_obspy
 from per_obspy.config import Building, Screening
-from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import (
+from per_obspy.screening.assignment import stations_of
+from per_obspy.screening.sensitivity import TAIL, input_sensitivity
+from per_obspy.screening.site_motion import (
     RegionalMotion,
     hypocentre_of,
     prepared_field,
 )
-from per_obspy.screening.sensitivity import TAIL, input_sensitivity
 
 #: A pair of derived periods, one of given ones with an uncertain gap, one with nothing uncertain.
 ROWS = (

@@ -10,7 +10,7 @@ from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.run import run
-from per_obspy.screening.region.totals import hexagons
+from per_obspy.screening.totals import hexagons
 from per_obspy.spectra.storage import read_spectra
 from per_obspy.tables.table_files import rounded
 

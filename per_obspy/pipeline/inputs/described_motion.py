@@ -16,7 +16,7 @@ from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.metadata import read_inventories
 from per_obspy.records.shakemap import is_scenario, read_shakemap
 from per_obspy.records.summary import RecordInfo
-from per_obspy.screening.by_spectrum.design import read_design_spectrum
+from per_obspy.screening.design import read_design_spectrum
 
 if TYPE_CHECKING:
     import xarray as xr

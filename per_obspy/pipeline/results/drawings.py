@@ -16,8 +16,8 @@ from per_obspy.pipeline.screening import shakemap_files
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.page.drawings import HISTORY_COLUMNS, drawn_history, drawn_station
 from per_obspy.report.results import Drawings
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.sensitivity import input_sensitivity
+from per_obspy.screening.site_motion import RegionalMotion
 
 #: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
 HISTORIES = 100

@@ -33,7 +33,7 @@ from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
 from per_obspy.screening.columns import column_table, known_column
-from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.tables.ranked_table import table_name
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 from per_obspy.tables.totals import (

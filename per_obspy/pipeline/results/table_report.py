@@ -27,9 +27,9 @@ from per_obspy.report.page.document import write_page
 from per_obspy.report.results import Drawings, Event, Region, Results
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
-from per_obspy.screening.by_spectrum.design import DESIGN
+from per_obspy.screening.design import DESIGN
+from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import pounding_state, risk_class
-from per_obspy.screening.region.ensemble import ensemble_columns
 from per_obspy.tables.coverage import Coverage
 
 
@@ -44,7 +44,7 @@ def report_design(
     settings : Design
         Settings of the screening.
     table : DataFrame
-        From :func:`per_obspy.screening.by_spectrum.design.design_table`.
+        From :func:`per_obspy.screening.design.design_table`.
     coverage : Coverage
         Rows of the pair table, and those that are left out.
     folder : Path

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pairs.node_motion import CORRELATION, DEMAND, MOTION_ROWS, estimate_motion
 from per_obspy.pounding.correlation import ddc_correlation
-from per_obspy.screening.by_record.station_motion import (
+from per_obspy.screening.station_motion import (
     LogSpectra,
     log_period_and_damping,
     stored_log,

@@ -23,7 +23,7 @@ from pyarrow import parquet
 
 from per_obspy.report.layers.geopackage import layer_names
 from per_obspy.report.layers.map_layers import MapSources, write_layers
-from per_obspy.screening.region.totals import box_outlines, grid_cells, totals
+from per_obspy.screening.totals import box_outlines, grid_cells, totals
 from per_obspy.tables.totals import RegionTotals
 
 CLASSES = ("severe", "high", "low")

@@ -13,7 +13,7 @@ from per_obspy.report.page.languages.spanish import SPANISH
 from per_obspy.report.page.texts import ENGLISH, LANGUAGES, counted
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 ASSETS = files("per_obspy.report.page") / "assets"
 

@@ -1,1 +1,0 @@
-"""Demand of pairs by the record of their station."""

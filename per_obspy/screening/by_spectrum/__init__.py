@@ -1,1 +1,0 @@
-"""Demand of pairs by a design spectrum or a ShakeMap."""

@@ -1,0 +1,227 @@
+"""Probability of pounding of each pair over several scenarios, and within a year."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.errors import Rejection
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.screening.values import BoolArray, Both, Columns, IndexArray
+
+
+def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> FloatArray:
+    """
+    Compute the probability given that one of the scenarios happens, ``sum(w P) / sum(w)``.
+
+    Parameters
+    ----------
+    probability : (n_scenarios, n_pairs) array_like
+        Of pounding in each scenario, from 0 to 1.
+    weights : (n_scenarios,) array_like
+        Weight of each scenario relative to the others; any positive sum.
+
+    Returns
+    -------
+    probability : (n_pairs,) ndarray
+        From 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If a probability is outside [0, 1], a weight is negative or all are 0.
+
+    Examples
+    --------
+    >>> print(conditional_probability([[1.0, 0.2], [0.0, 0.6]], [3.0, 1.0]))
+    [0.75 0.3 ]
+    """
+    pounding, weight = _scenarios(probability, weights, "weights")
+    if not weight.sum() > 0:
+        raise ValueError(f"weights must have a positive sum, got {weight.sum():g}")
+    joined: FloatArray = np.minimum(_weighted_sum(pounding, weight / weight.sum()), 1.0)
+    return joined
+
+
+def annual_probability(probability: ArrayLike, rates: ArrayLike) -> FloatArray:
+    """
+    Compute the probability that a pair pounds within a year, ``1 - exp(-sum(rate P))``.
+
+    Scenarios come as a Poisson process, and pounding does not change a pair.
+
+    Parameters
+    ----------
+    probability : (n_scenarios, n_pairs) array_like
+        Of pounding in each scenario, from 0 to 1.
+    rates : (n_scenarios,) array_like
+        Rate of each scenario, 1/year.
+
+    Returns
+    -------
+    probability : (n_pairs,) ndarray
+        In one year.
+
+    Raises
+    ------
+    ValueError
+        If a probability is outside [0, 1] or a rate is negative.
+
+    Examples
+    --------
+    >>> print(annual_probability([[1.0, 0.0]], [0.01]).round(6))
+    [0.00995 0.     ]
+    """
+    pounding, rate = _scenarios(probability, rates, "rates")
+    return np.asarray(-np.expm1(-_weighted_sum(pounding, rate)))
+
+
+def _weighted_sum(probability: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the weighted sum over the scenarios for each pair."""
+    # Unlike a matrix product, this gives a pair the same bits whatever other pairs there are
+    total = np.zeros(probability.shape[1])
+    for row, factor in zip(probability, weight, strict=True):
+        total += factor * row
+    return total
+
+
+def _scenarios(probability: ArrayLike, weights: ArrayLike, name: str) -> Both:
+    """Check probabilities, (n_scenarios, n_pairs), and one weight or rate per scenario."""
+    pounding = np.atleast_2d(checks.between("probability", probability, 0.0, 1.0))
+    weight = np.atleast_1d(checks.not_negative(name, weights))
+    if weight.shape != pounding.shape[:1]:
+        raise ValueError(f"{name} must be one a scenario ({pounding.shape[0]}), got {weight.size}")
+    return pounding, weight
+
+
+#: Columns, with units, in which all scenarios must agree, else equal names are not the same pair.
+SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
+
+#: Expected severity of a pair in a scenario, by which pairs are ordered, and its value where it is
+#: unknown: that without contact.
+SEVERITY = {"expected_impact_velocity": 0.0, "expected_amplification": 1.0}
+
+#: Columns that do not depend on the scenarios; ``probability`` is the third.
+JOINED = (
+    Column("rank", "int64", "", "1 is the worst: by expected impact velocity, then amplification"),
+    Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
+    Column(
+        "annual_probability",
+        "float64",
+        "1",
+        "of pounding within a year, scenarios coming as a Poisson process",
+    ),
+    Column("expected_impact_velocity", "float64", "m/s", "weighted mean of those in the scenarios"),
+    Column(
+        "expected_amplification",
+        "float64",
+        "1",
+        "weighted mean of those in the scenarios; 1 without contact",
+    ),
+    Column(
+        "worst_scenario", "str", "", "name of the one with the largest expected impact velocity"
+    ),
+)
+
+
+def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
+    """
+    Return the columns of the ensemble table in order, by name.
+
+    Weights are those of the scenarios, by name, or their rates where ``yearly``, 1/year:
+    ``annual_probability`` is a column then.
+    """
+    unit = "/year" if yearly else ""
+    scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
+    chance = f"of pounding, given that one of these happens: {scenarios}"
+    columns = [*JOINED[:2], Column("probability", "float64", "1", chance), *JOINED[2:]]
+    # Columns of the scenarios follow the joined ones
+    for name in weights:
+        meaning = f"of pounding in scenario {name}"
+        columns.append(Column(f"probability_{name}", "float64", "1", meaning))
+    columns += [(COLUMNS | COMPLETED)[name] for name in SAME]
+    # weights that are no rates leave the yearly probability out
+    return {
+        column.name: column for column in columns if yearly or column.name != "annual_probability"
+    }
+
+
+def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> pd.DataFrame:
+    """
+    Compute the probabilities of pairs from their joined scenarios.
+
+    Parameters
+    ----------
+    joined : DataFrame
+        ``pair_id``; ``probability_<name>``, ``expected_impact_velocity_<name>`` (m/s) and
+        ``expected_amplification_<name>`` of each scenario; and the smallest and largest value in
+        any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
+    weights : mapping of str to float
+        Weight of each scenario; see :func:`conditional_probability`.
+    yearly : bool
+        Whether weights are rates, 1/year: :func:`annual_probability` is a column then.
+
+    Returns
+    -------
+    DataFrame
+        Columns of :func:`ensemble_columns` without ``rank``, in the order of the rows; without the
+        pairs that :func:`ensemble_rejections` names.
+    """
+    rows = joined[_comparable(joined, weights)].reset_index(drop=True)
+    weight = np.array(list(weights.values()))
+    pounding, velocity, amplification = (
+        rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64).T
+        for name in ("probability", *SEVERITY)
+    )
+    # Probabilities and severities over all scenarios
+    columns: Columns = {"probability": conditional_probability(pounding, weight)}
+    if yearly:
+        columns["annual_probability"] = annual_probability(pounding, weight)
+    for severity, (name, unknown) in zip((velocity, amplification), SEVERITY.items(), strict=True):
+        beyond = np.nan_to_num(severity - unknown)
+        columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
+    # the hardest impact
+    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, velocity)]
+    names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
+    return rows.assign(**columns)[names]
+
+
+def _worst(pounding: FloatArray, velocity: FloatArray) -> IndexArray:
+    """Return the scenario of the hardest impact of each pair; of equal ones the likeliest."""
+    order = np.lexsort((-pounding, -np.nan_to_num(velocity)), axis=0)
+    return np.asarray(order[0])
+
+
+def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:
+    """Yield rejections of pairs without a probability in a scenario, or with differing data."""
+    for row in joined[~_comparable(joined, weights)].to_dict("records"):
+        reasons = []
+        lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
+        if lacking:
+            names = ", ".join(lacking)
+            reasons.append(
+                f"no probability in {names}: not in its inventory, rejected there, or its gap is "
+                "unknown"
+            )
+
+        # Smallest and largest value of columns that must be the same
+        for name, unit in SAME.items():
+            smallest, largest = row[name], row[f"{name}_largest"]
+            # An unknown gap is NaN in all of them
+            if smallest != largest and smallest == smallest:
+                reasons.append(
+                    f"{name} = {smallest:.9g} {unit} in one scenario "
+                    f"and {largest:.9g} {unit} in another"
+                )
+        yield Rejection("pair", str(row["pair_id"]), "", None, tuple(reasons))
+
+
+def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> BoolArray:
+    """Return a mask of pairs with a probability in every scenario and equal data in all."""
+    names = [f"probability_{name}" for name in weights]
+    comparable: BoolArray = joined[names].notna().all(axis=1).to_numpy()
+    for name in SAME:
+        comparable = comparable & (joined[name] == joined[f"{name}_largest"]).to_numpy()
+    return comparable

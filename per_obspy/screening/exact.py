@@ -1,0 +1,280 @@
+"""
+Exact demand and history of pairs with a record, and the damping that keeps them apart.
+
+Both buildings are oscillators at contact height, driven along one azimuth; only the oscillators
+are estimates.
+
+Supplemental damping is added to both buildings in steps, and refined before the first step that is
+enough: more damping does not always help. The demand is the one that decides of such pairs: along
+the pair's azimuth, or along the worst one where that is unknown.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from per_obspy.checks import FloatArray
+from per_obspy.pounding.correlation import worst_azimuth
+from per_obspy.pounding.pair_histories import PoundingMaxima, pounding_histories
+from per_obspy.pounding.relative import (
+    Approach,
+    approach,
+    directional_relative_displacement,
+    yielding_relative_displacement,
+)
+from per_obspy.screening.flags import period_is_derived
+from per_obspy.screening.station_motion import StationMotion
+from per_obspy.screening.values import (
+    BoolArray,
+    Columns,
+    Table,
+    at_contact,
+    both,
+    chosen,
+    only,
+    oscillators,
+    values,
+)
+
+#: Columns of :func:`exact_outcome`.
+EXACT_COLUMNS = (
+    "demand_exact",
+    "demand_two_sided",
+    "impacts",
+    "impact_velocity_exact",
+    "amplification_exact_1",
+    "amplification_exact_2",
+)
+
+#: Share of the gap below which a demand without contact, known to 1e-9, leaves the pair apart.
+CERTAINLY_APART = 1.0 - 1e-6
+
+
+def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
+    """Return the axis from 1 to 2 along which the record demands the largest gap, degrees."""
+    shares = both(pairs, "participation")
+    return worst_azimuth(*station.components, *oscillators(pairs), *shares)
+
+
+def exact_decides(station: StationMotion, pairs: Table) -> BoolArray:
+    """
+    Return a mask of the completed pairs whose demand is the exact one.
+
+    The record must support the pair, and no period may be derived: the exact demand of two equal
+    derived periods is 0.
+    """
+    return record_supports(station, pairs) & ~period_is_derived(pairs)
+
+
+def record_supports(station: StationMotion, pairs: Table) -> BoolArray:
+    """
+    Return a mask of the completed pairs for which the record gives an exact demand.
+
+    It must hold both periods in its usable range and both horizontals. The worst azimuth is known
+    of linear buildings only: where one can yield, the pair's azimuth must be given.
+    """
+    periods = np.stack(both(pairs, "period"))
+    shortest, longest = station.usable_periods
+    usable = ((periods >= shortest) & (periods <= longest)).all(axis=0)
+    directed = ~can_yield(pairs) | np.isfinite(values(pairs, "azimuth"))
+    return np.asarray(usable & directed & (station.horizontals == 2))
+
+
+def can_yield(pairs: Table) -> BoolArray:
+    """Return a mask of the pairs in which a building has a yield displacement."""
+    return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
+
+
+def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> Columns:
+    """
+    Compute exact relative displacements and pounding histories of a block of pairs.
+
+    ``azimuth`` is that of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
+    Pairs whose azimuth is unknown are turned by 180 degrees where the demand is larger there.
+    ``table`` holds completed pairs with their radii along the azimuth, and ``azimuth_used``.
+    Returns ``EXACT_COLUMNS`` and ``azimuth_used``, (n_pairs,), see ``columns.RESULTS``.
+    """
+    towards, away, *radii = _without_contact(station, table, azimuth)
+    # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one
+    turned = np.isnan(values(table, "azimuth")) & (away > towards)
+    demand, axis = np.where(turned, away, towards), values(table, "azimuth_used")
+    driven = np.where(turned, azimuth + 180.0, azimuth)
+    outcome = {"azimuth_used": np.where(turned, (axis + 180.0) % 360.0, axis)}
+    outcome |= {"demand_exact": demand, "demand_two_sided": np.maximum(towards, away)}
+    return outcome | _pounding_columns(station, table, driven, demand, np.stack(radii))
+
+
+def _pounding_columns(
+    station: StationMotion,
+    table: Table,
+    azimuth: FloatArray,
+    demand: FloatArray,
+    radii: FloatArray,
+) -> Columns:
+    """
+    Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
+
+    A demand that stays below the gap needs no history: radii are those without contact.
+    """
+    meets = ~(demand < CERTAINLY_APART * values(table, "gap"))
+    impacts, velocity = np.zeros(demand.size, dtype=np.int64), np.zeros(demand.size)
+    amplification = np.ones((2, demand.size))
+    if meets.any():
+        history = pounding_maxima(station, chosen(table, meets), azimuth[meets])
+        impacts[meets], velocity[meets] = history.impacts, history.impact_velocity
+        # impacts amplify the radius that the same oscillator has without contact
+        before, ratio = radii[:, meets], np.ones_like(history.per)
+        amplification[:, meets] = np.divide(history.per, before, out=ratio, where=before > 0)
+    columns = impacts, velocity, *amplification
+    return dict(zip(EXACT_COLUMNS[2:], columns, strict=True))
+
+
+def no_outcome(count: int) -> Columns:
+    """Return empty ``EXACT_COLUMNS`` for a number of pairs."""
+    return {name: np.full(count, np.nan) for name in EXACT_COLUMNS}
+
+
+def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+    """Return the largest relative displacement of 1 towards 2, as in :func:`exact_outcome`, m."""
+    towards: FloatArray = _without_contact(station, table, azimuth)[0]
+    return towards
+
+
+def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) -> Approach:
+    """Return the largest relative motion of linear buildings without contact, 1 towards 2."""
+    relative: Approach = approach(*station.components, *_arguments(table, azimuth))
+    return relative
+
+
+def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -> PoundingMaxima:
+    """Return the maxima of the pounding histories, at contact level."""
+    (mass_1, mass_2), (share_1, share_2) = both(table, "contact_mass"), both(table, "participation")
+    period_1, damping_1, period_2, damping_2 = oscillators(table)
+    # bilinear oscillators in order 1, 2; an infinite yield displacement is a linear one
+    maxima: PoundingMaxima = pounding_histories(
+        np.stack([station.north, station.east]),
+        station.dt,
+        period_1,
+        damping_1,
+        mass_1,
+        period_2,
+        damping_2,
+        mass_2,
+        gap=values(table, "gap"),
+        restitution=values(table, "restitution"),
+        participation_1=share_1,
+        participation_2=share_2,
+        azimuth=azimuth,
+        **_strengths(table),
+    )
+    return maxima
+
+
+def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+    """
+    Return the response at contact level of pairs that do not touch, (4, n_pairs), m.
+
+    Largest relative displacement of 1 towards 2, and with the buildings in the other order; PER of
+    both buildings. Linear pairs take the shorter computation, and their PER from the table.
+    """
+    free = np.empty((4, azimuth.size))
+    free[2:] = at_contact(table, "per")
+    yields = can_yield(table)
+    if not yields.all():
+        arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
+        linear = directional_relative_displacement(*station.components, *arguments)
+        free[:2, ~yields] = linear.one_before_two, linear.two_before_one
+    if yields.any():
+        # PER of the yielding oscillators
+        pairs = chosen(table, yields)
+        bilinear = yielding_relative_displacement(
+            np.stack([station.north, station.east]),
+            station.dt,
+            *_arguments(pairs, azimuth[yields]),
+            **_strengths(pairs),
+        )
+        free[:, yields] = bilinear.one_before_two, bilinear.two_before_one, *bilinear.per
+    return free
+
+
+def _arguments(pairs: Table, azimuth: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the arguments of relative displacements: oscillators, azimuth and participations."""
+    return *oscillators(pairs), azimuth, *both(pairs, "participation")
+
+
+def _strengths(pairs: Table) -> dict[str, Any]:
+    """Return yield displacement, m, and hardening of both buildings; NaN of linear ones."""
+    strengths = {}
+    for i, yields in enumerate(at_contact(pairs, "yield_displacement"), start=1):
+        strengths[f"yield_displacement_{i}"] = yields
+        strengths[f"hardening_{i}"] = values(pairs, f"hardening_{i}")
+    return strengths
+
+
+#: Step of the scan over the added damping, fraction of critical.
+SCAN_STEP = 0.04
+
+#: The step before the first damping that is enough is halved so many times: to 4e-5.
+HALVINGS = 10
+
+#: Columns from which the exact demand follows.
+NEEDED = (
+    *("azimuth", "gap"),
+    *(
+        f"{name}_{i}"
+        for name in ("period", "damping", "participation", "per", "yield_displacement", "hardening")
+        for i in (1, 2)
+    ),
+)
+
+#: Largest damping of a building that still vibrates, fraction of critical.
+NEARLY_CRITICAL = 0.99
+
+
+def least_exact_damping(station: StationMotion, table: Table, largest: float) -> FloatArray:
+    """
+    Find the least added damping of both buildings with which the exact demand fits into the gap.
+
+    ``table`` holds completed pairs whose exact demand decides and exceeds the gap. Returns a
+    fraction of critical (n_pairs,), enough itself; NaN where none up to the largest is enough.
+    """
+    table = only(table, NEEDED)
+    # As far as both buildings still vibrate
+    most = np.minimum(largest, NEARLY_CRITICAL - np.maximum(*both(table, "damping")))
+    enough, low = np.full((2, most.size), np.nan)
+    # Scan: pairs that are helped or at their limit leave it
+    waiting = np.arange(most.size)
+    for step in range(1, int(np.ceil(largest / SCAN_STEP - 1e-9)) + 1):
+        added = np.minimum(step * SCAN_STEP, most[waiting])
+        fits = _fits(station, chosen(table, waiting), added)
+        enough[waiting[fits]] = added[fits]
+        low[waiting[fits]] = (step - 1) * SCAN_STEP
+        waiting = waiting[~fits & (added < most[waiting])]
+        if not waiting.size:
+            break
+    _refine(station, table, low, enough)
+    return enough
+
+
+def _refine(station: StationMotion, table: Table, low: FloatArray, enough: FloatArray) -> None:
+    """Refine the least damping by bisection, whose upper end is always enough; NaN stays."""
+    # pairs that a damping helps
+    helped = np.flatnonzero(np.isfinite(enough))
+    pairs = chosen(table, helped)
+    for _ in range(HALVINGS if helped.size else 0):
+        middle = 0.5 * (low[helped] + enough[helped])
+        fits = _fits(station, pairs, middle)
+        enough[helped[fits]], low[helped[~fits]] = middle[fits], middle[~fits]
+
+
+def _fits(station: StationMotion, table: Table, added: FloatArray) -> BoolArray:
+    """Return a mask of the pairs whose exact demand with the added damping is at most the gap."""
+    damping_1, damping_2 = both(table, "damping")
+    damped = {name: table[name] for name in table}
+    damped |= {"damping_1": damping_1 + added, "damping_2": damping_2 + added}
+    # The worst azimuth turns as damping is added
+    azimuth = values(table, "azimuth").copy()
+    unknown = np.isnan(azimuth)
+    if unknown.any():
+        azimuth[unknown] = furthest_azimuth(station, chosen(damped, unknown))
+    return exact_demand(station, damped, azimuth) <= values(table, "gap")

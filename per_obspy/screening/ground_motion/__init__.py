@@ -1,1 +1,0 @@
-"""Assignment of stations to pairs, and ground motion between stations."""

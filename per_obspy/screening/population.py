@@ -1,0 +1,399 @@
+"""
+Population of a pair: its outcomes at nodes of all uncertain values.
+
+The nodes are quasi-random: periods and dampings of both buildings, other uncertainties
+of the demand (motion at the site, error of an estimate), and the gap. Every node has a demand and
+an impact velocity. The probability is the mean over the buildings of the nodes of the chance that a
+lognormal demand exceeds a lognormal gap; expected values and the quantile are those of all nodes,
+with 0 where there is no contact, the quantile being that of 84 in 100: one standard deviation above
+the median of a normal variable. Without uncertainty all nodes are one.
+
+A node is as uncertain as everything but the buildings is, or as the spread of the nodes over the
+root of their number where that is more. The spread is the smaller one of the standard deviation and
+that of a normal variable of the same quartiles: few nodes far off do not count.
+
+Periods and dampings are lognormal, independent in both buildings. One node serves all pairs
+alike, so that a row does not depend on the other pairs.
+
+Two oscillators whose relative displacement would reach D and whose relative velocity V hit at a gap
+g with ``V sqrt(1 - (g/D)²)`` if their relative motion were harmonic. Earlier impacts keep nearly
+equal oscillators from building up a relative motion at all: the velocity is less by the factor
+``exp(-LOSS sqrt(rho) (1 - g/D))`` with rho of eq. (16). The change of velocity dv of eq. (7) and
+(8) amplifies a radius r by ``sqrt(1 + (RADIUS_SHARE dv / (w r))²)``, as of a random phase. The
+constants are those of ``kernels/pairs/node_outcomes.py``, fitted to exact histories in 3 events of
+real records; ``workflows/population_accuracy.py`` has their accuracy in others.
+
+Where the demand is an estimate, by radii of a spectrum, eq. (15) and (16), the motion is given by
+its effect on the pairs (:class:`UncertainMotion`), whether it comes from a record, a ShakeMap or a
+design spectrum. Periods and dampings are resampled for each building separately, with radii from
+spectra scaled to the median radius. So two buildings of equal height are never certain to move as
+one.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
+from per_obspy.kernels.pairs.node_outcomes import (
+    OUTCOME_ROWS,
+    fill_chances,
+    fill_outcomes,
+    fill_velocities,
+)
+from per_obspy.pounding.correlation import ddc_correlation
+from per_obspy.pounding.probability import lognormal_dispersion
+from per_obspy.screening.station_motion import (
+    LogSpectra,
+    log_period_and_damping,
+    stored_log,
+)
+from per_obspy.screening.values import (
+    BoolArray,
+    Both,
+    Columns,
+    IndexArray,
+    Table,
+    both,
+    chosen,
+    values,
+)
+
+#: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
+#: given buildings, and of ln gap: the second 128 Sobol points, which lie in the middle of their
+#: strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at
+#: some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(6, scramble=False).fast_forward(128).random(128))
+
+#: Columns of ``NODES``: both buildings, demand, gap.
+BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
+
+#: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
+#: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
+TOUCHING, APART, WIDE = (0.01, 0.9), (0.16, 0.84), 3.0
+
+#: Chance that buildings whose drawn outlines touch have one wall.
+ONE_WALL = 0.5
+
+#: Largest damping of a node, fraction of critical: an oscillator has less than the critical one.
+LARGEST_DAMPING = 0.99
+
+
+def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
+    """
+    Return the period of building i, (n_pairs, n_nodes), s, from its median and
+    ``period_log_std_i``.
+    """
+    deviation = values(table, f"period_log_std_{i}")
+    period: FloatArray = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 2]))
+    return period
+
+
+def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
+    """Return the damping of building i at the nodes, as :func:`period_at_nodes`; below critical."""
+    deviation = values(table, f"damping_log_std_{i}")
+    damping = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 1]))
+    largest = np.maximum(median, LARGEST_DAMPING)[:, None]
+    return np.asarray(np.minimum(damping, largest))
+
+
+def building_is_uncertain(pairs: Table) -> BoolArray:
+    """Return a mask of pairs in which a period or damping has a log-standard deviation."""
+    period = np.maximum(*both(pairs, "period_log_std"))
+    damping = np.maximum(*both(pairs, "damping_log_std"))
+    return np.asarray((period > 0) | (damping > 0))
+
+
+def gap_dispersion(pairs: Table) -> FloatArray:
+    """
+    Return the log-standard deviation of a lognormal gap; 0 where the gap is certain.
+
+    A gap is a distance measured with a normal error, and not below 0: either the walls are one, or
+    the gap has a normal distribution about ``gap`` with ``gap_std``, truncated at 0. Both are
+    equally likely where outlines touch, as the error alone would give a stiff pair, whose demand is
+    a hundredth of it, a ``no``. For outlines apart, Bayes' rule gives the chance that the walls are
+    one. The lognormal gap has two quantiles of this distribution (``TOUCHING``, ``APART``).
+
+    A gap that the configuration assumes (``assumed_gap``) is lognormal itself, with mean ``gap``.
+    """
+    return _lognormal_gap(pairs)[1]
+
+
+def median_gap(pairs: Table) -> FloatArray:
+    """Return the median of a lognormal gap, m, as :func:`gap_dispersion`."""
+    return _lognormal_gap(pairs)[0]
+
+
+def one_wall_chance(pairs: Table) -> FloatArray:
+    """Return the probability that buildings with touching outlines share a wall; else 0."""
+    touching = (values(pairs, "gap") == 0.0) & (values(pairs, "gap_std") > 0.0)
+    return np.where(touching, ONE_WALL, 0.0)
+
+
+def _lognormal_gap(pairs: Table) -> Both:
+    """Return median, m, and log-standard deviation of lognormal gaps."""
+    gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
+    assumed = values(pairs, "assumed_gap") > 0 if "assumed_gap" in pairs else gap < 0
+    measured, lognormal = (deviation > 0) & ~assumed, (gap > 0) & assumed
+    # Certain gaps stay
+    median, dispersion = gap.copy(), np.zeros(gap.shape)
+    dispersion[lognormal] = lognormal_dispersion(gap[lognormal], deviation[lognormal])
+    median[lognormal] *= np.exp(-(dispersion[lognormal] ** 2) / 2.0)
+    fitted = _with_quantiles(gap[measured], deviation[measured])
+    median[measured], dispersion[measured] = fitted
+    return median, dispersion
+
+
+def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> Both:
+    """Return median, m, and log-standard deviation of lognormal gaps from measured ones."""
+    # Quantiles of the normal distribution above 0
+    apart = np.minimum(gap / (WIDE * deviation), 1.0)
+    low, high = (near + apart * (far - near) for near, far in zip(TOUCHING, APART, strict=True))
+    above = ndtr(gap / deviation)
+    lower, upper = (gap - deviation * ndtri(above * (1.0 - share)) for share in (low, high))
+    # The same lengths as quantiles of all gaps, of which some are 0
+    odds = np.exp(-((gap / deviation) ** 2) / 2.0) / (2.0 * above)
+    one_wall = odds / (1.0 + odds)
+    low, high = (ndtri(one_wall + (1.0 - one_wall) * share) for share in (low, high))
+    dispersion = np.log(upper / lower) / (high - low)
+    return upper * np.exp(-high * dispersion), dispersion
+
+
+class RelativeMotion(NamedTuple):
+    """
+    Motion without contact of pairs at nodes, (n_pairs, n_nodes); proportional to the ground motion.
+
+    Attributes
+    ----------
+    demand : ndarray
+        Largest relative displacement of 1 towards 2 at contact height, m.
+    velocity : ndarray
+        Largest relative velocity, m/s.
+    speed_1, speed_2 : ndarray
+        Circular frequency times radius of both oscillators at contact height, m/s.
+    correlation : ndarray
+        Of both responses by eq. (16), dimensionless.
+    """
+
+    demand: FloatArray
+    velocity: FloatArray
+    speed_1: FloatArray
+    speed_2: FloatArray
+    correlation: FloatArray
+
+    def rows(self) -> FloatArray:
+        """Return the motion as one array, (5, n_pairs, n_nodes), in the order of the kernels."""
+        return np.stack(self)
+
+
+def impact_velocity(motion: RelativeMotion, scale: FloatArray, gap: FloatArray) -> FloatArray:
+    """
+    Return the largest approach velocity of the impacts, (n_pairs, n_nodes), m/s.
+
+    It is 0 where the gap, m, is wide enough for the motion times ``scale``; both broadcast to its
+    shape.
+    """
+    shape = motion.demand.shape
+    velocity = np.empty(shape)
+    scales, gaps = (np.ascontiguousarray(np.broadcast_to(one, shape)) for one in (scale, gap))
+    fill_velocities(motion.rows(), scales, gaps, velocity)
+    return velocity
+
+
+#: Columns of a table that are a population.
+COLUMNS = (
+    "probability",
+    "expected_impact_velocity",
+    "impact_velocity_84",
+    "expected_amplification",
+)
+
+
+class Uncertain(NamedTuple):
+    """
+    Motion of pairs without contact at the nodes of their buildings, and other uncertain values.
+
+    Attributes
+    ----------
+    motion : RelativeMotion
+        (n_pairs, n_nodes), at the site; one node where the buildings are certain.
+    log_std : (n_pairs,) ndarray
+        Log-standard deviation of the demand for given buildings.
+    velocity_factor : (n_pairs,) ndarray
+        By which impact velocities are known to differ from those of `impact_velocity`.
+    """
+
+    motion: RelativeMotion
+    log_std: FloatArray
+    velocity_factor: FloatArray
+
+
+def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns:
+    """
+    Compute the population of completed pairs: ``COLUMNS``, each (n_pairs,).
+
+    Probabilities from 0 to 1, velocities in m/s, amplifications of at least 1. ``nodes`` are those
+    of the motion, (n_nodes, 6), as ``NODES``.
+    """
+    shape = uncertain.log_std.size, len(nodes)
+    facts = np.stack(
+        [
+            *(median_gap(pairs), gap_dispersion(pairs)),
+            *(uncertain.log_std, uncertain.velocity_factor),
+            *_received(pairs),
+        ]
+    )
+    deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP]].T)
+    # one node of certain buildings is all nodes
+    every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
+    # always writable: a read-only array would compile the kernel a second time
+    every = np.require(every, requirements=["C", "W"])
+    outcome = np.empty((OUTCOME_ROWS, len(facts[0])))
+    fill_outcomes(every, facts, deviates, outcome)
+    # the lognormal gap has no share of exactly 0, at which any motion is contact
+    moving = (uncertain.motion.demand > 0.0).mean(axis=1)
+    outcome[0] = np.maximum(outcome[0], one_wall_chance(pairs) * moving)
+    return dict(zip(COLUMNS, outcome, strict=True))
+
+
+def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) -> FloatArray:
+    """
+    Return the mean over the nodes of the chance that a demand exceeds an uncertain gap.
+
+    ``demands`` are medians, (n_pairs, n_nodes), m; ``log_std`` is the log-standard deviation of all
+    demands of a pair.
+    """
+    chances = np.empty(log_std.size)
+    deviation = np.hypot(gap_dispersion(table), log_std)
+    fill_chances(np.ascontiguousarray(demands), median_gap(table), deviation, chances)
+    return chances
+
+
+def _received(pairs: Table) -> Both:
+    """Return the change of velocity of both buildings over the impact velocity."""
+    mass_1, mass_2 = both(pairs, "contact_mass")
+    share = (1.0 + values(pairs, "restitution")) / (mass_1 + mass_2)
+    return share * mass_2, share * mass_1
+
+
+#: Median and log-standard deviation of the gap from SD and eq. (16) over the exact one: 91 pairs of
+#: periods from 0.3 to 4 s at 5 % damping under 14 broad-band records.
+SD_MEDIAN, SD_DISPERSION = 0.97, 0.14
+
+#: Pairs times nodes that are computed together: every array stays below 256 kB.
+SAMPLES = 32_768
+
+
+class UncertainRadius(NamedTuple):
+    """
+    Radius of one building of every pair under an uncertain motion, each (n_pairs,).
+
+    Attributes
+    ----------
+    radius : ndarray
+        Median at contact height, of which the critical gap is right in the median, m.
+    ln_ratio : ndarray
+        Logarithm of the radius at the site over ``radius``.
+    period, damping : ndarray
+        Medians of the oscillator that has this radius, s and fraction of critical.
+    """
+
+    radius: FloatArray
+    ln_ratio: FloatArray
+    period: FloatArray
+    damping: FloatArray
+
+
+class UncertainMotion(NamedTuple):
+    """
+    Response of pairs to an uncertain motion, each (n_pairs,).
+
+    Attributes
+    ----------
+    first, second : UncertainRadius
+        Buildings 1 and buildings 2.
+    correlation : ndarray
+        Of both responses at the medians, dimensionless; where it is not that of eq. (16), that of
+        the nodes differs from theirs by as much.
+    log_std : ndarray
+        Log-standard deviation of the critical gap for given buildings: by the motion, and of the
+        estimate over the exact demand.
+    row : ndarray of int
+        Of the spectra by which the radii change.
+    """
+
+    first: UncertainRadius
+    second: UncertainRadius
+    correlation: FloatArray
+    log_std: FloatArray
+    row: IndexArray
+
+    def rows(self, chosen_rows: NDArray[np.generic]) -> "UncertainMotion":
+        """Return the motion of some pairs, by their numbers or a mask."""
+        return UncertainMotion(
+            UncertainRadius(*(column[chosen_rows] for column in self.first)),
+            UncertainRadius(*(column[chosen_rows] for column in self.second)),
+            self.correlation[chosen_rows],
+            self.log_std[chosen_rows],
+            self.row[chosen_rows],
+        )
+
+
+def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Table) -> Columns:
+    """
+    Compute the population of completed pairs under an uncertain motion: ``COLUMNS``.
+
+    ``spectra`` are those by which the radii of resampled oscillators change; at the edge beyond the
+    grid.
+    """
+    count = motion.row.size
+    result: Columns = {name: np.empty(count) for name in COLUMNS}
+    size = SAMPLES // len(NODES)
+    # blocks bound the memory; a pair does not depend on its block
+    for first in range(0, count, size):
+        rows = np.arange(first, min(first + size, count))
+        block, table = motion.rows(rows), chosen(pairs, rows)
+        relative = estimated_motion(block, spectra, table, NODES)
+        uncertain = Uncertain(relative, block.log_std, np.ones(rows.size))
+        for name, column in population(uncertain, table, NODES).items():
+            result[name][rows] = column
+    return result
+
+
+def estimated_motion(
+    motion: UncertainMotion, spectra: LogSpectra, pairs: Table, nodes: FloatArray
+) -> RelativeMotion:
+    """Estimate the motion of pairs without contact at nodes (n_nodes, 6) of their buildings."""
+    first = _oscillators(motion.first, motion.row, spectra, pairs, 1)
+    second = _oscillators(motion.second, motion.row, spectra, pairs, 2)
+    # eq. (16), shifted as that which governs at the medians
+    shift = motion.correlation - ddc_correlation(
+        *(motion.first.period, motion.first.damping),
+        *(motion.second.period, motion.second.damping),
+    )
+    relative = np.empty((MOTION_ROWS, motion.row.size, len(nodes)))
+    deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
+    estimate_motion(
+        *spectra, motion.row, np.stack([*first, *second]), np.atleast_1d(shift), deviates, relative
+    )
+    return RelativeMotion(*relative)
+
+
+def _oscillators(
+    building: UncertainRadius, row: IndexArray, spectra: LogSpectra, pairs: Table, i: int
+) -> tuple[FloatArray, ...]:
+    """Return the oscillators of building i in the rows of the kernel."""
+    # the radius changes as the stored spectrum does from the medians to the node
+    at_medians = log_period_and_damping(building.period, building.damping)
+    where_stored_is_one = building.radius * np.exp(
+        building.ln_ratio - stored_log(spectra, row, *at_medians)
+    )
+    return (
+        *(building.period, values(pairs, f"period_log_std_{i}")),
+        *(building.damping, values(pairs, f"damping_log_std_{i}")),
+        *(np.maximum(building.damping, LARGEST_DAMPING), where_stored_is_one),
+    )

@@ -1,1 +1,0 @@
-"""Risk of a region: totals of areas, comparison with observations, several scenarios."""

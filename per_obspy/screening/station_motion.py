@@ -1,0 +1,261 @@
+"""
+Motion of a station: its record, its stored spectra, and the radii of pairs read from them.
+
+Every array of radii has the shape (n_pairs, n_azimuths): one azimuth where the pair's is known or
+the station has a single horizontal, else every degree of the half circle, from which the pair's
+worst is chosen by its demand. Both buildings are always driven along the same azimuth.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.pounding.correlation import directional_correlation
+from per_obspy.screening.values import (
+    Both,
+    IndexArray,
+    Table,
+    components,
+    number,
+    oscillators,
+    values,
+)
+from per_obspy.spectra.azimuthal import (
+    EVERY_AZIMUTH,
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+)
+from per_obspy.spectra.per_pair import azimuth_maxima
+
+#: Dampings are compared on a logarithmic scale; below this one they count as it.
+SMALLEST_DAMPING = 1e-3
+
+
+class LogSpectra(NamedTuple):
+    """
+    Stored spectra on logarithmic axes.
+
+    Attributes
+    ----------
+    periods, dampings : (n_periods,), (n_dampings,) ndarray
+        Logarithms of periods in s and of dampings as fractions of critical.
+    radii : (n_azimuths, n_dampings, n_periods) ndarray
+        Logarithms of PER or SD in m.
+    """
+
+    periods: FloatArray
+    dampings: FloatArray
+    radii: FloatArray
+
+
+def log_oscillator(table: Table, i: int) -> Both:
+    """Return ln period and ln damping of building i."""
+    return log_period_and_damping(values(table, f"period_{i}"), values(table, f"damping_{i}"))
+
+
+def log_period_and_damping(period: FloatArray, damping: FloatArray) -> Both:
+    """Return ln period and ln damping, in s and fractions of critical."""
+    return np.log(period), np.log(np.maximum(damping, SMALLEST_DAMPING))
+
+
+def stored_log(
+    spectra: LogSpectra, row: IndexArray, log_period: FloatArray, log_damping: FloatArray
+) -> FloatArray:
+    """
+    Interpolate stored logarithms at rows of azimuths, ln period and ln damping.
+
+    Arrays broadcast; the result is ln PER or ln SD in m, bilinear on the logarithmic axes and
+    constant beyond the grid.
+    """
+    periods, dampings, radii = spectra
+    # cell of the grid and position in it, along either axis
+    column, period_share = _lower_neighbour(periods, log_period)
+    plane, damping_share = _lower_neighbour(dampings, log_damping)
+    next_plane = np.minimum(plane + 1, dampings.size - 1)
+    next_column = np.minimum(column + 1, periods.size - 1)
+    # along the period at the damping below and at that above, then from one to the other
+    left, right = radii[row, plane, column], radii[row, plane, next_column]
+    lower = (1 - period_share) * left + period_share * right
+    left, right = radii[row, next_plane, column], radii[row, next_plane, next_column]
+    upper = (1 - period_share) * left + period_share * right
+    stored: FloatArray = (1 - damping_share) * lower + damping_share * upper
+    return stored
+
+
+def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """Return the lower neighbour on a grid, and the fraction towards the next one, 0 to 1."""
+    if grid.size == 1:
+        return np.zeros(points.shape, dtype=np.intp), np.zeros(points.shape)
+    lower = np.clip(np.searchsorted(grid, points) - 1, 0, grid.size - 2)
+    return lower, np.clip((points - grid[lower]) / (grid[lower + 1] - grid[lower]), 0.0, 1.0)
+
+
+class StationMotion(NamedTuple):
+    """
+    Record and stored spectra of one station.
+
+    Attributes
+    ----------
+    north, east : (n_samples,) ndarray
+        Ground acceleration, m/s². The record of a single horizontal is ``north``, to be used at
+        azimuth 0; ``east`` is 0 then.
+    dt : float
+        Sampling interval, s.
+    horizontals : int
+        Number of horizontal sensors, 1 or 2.
+    sensor_azimuth : float
+        Of a single horizontal, degrees clockwise from north; NaN if unknown, or of two horizontals.
+    usable_periods : tuple of float
+        Shortest and longest usable period, s.
+    azimuths : (n_azimuths,) ndarray
+        Of the stored spectra, degrees, evenly spaced over the half circle; 0 of one horizontal.
+    per, sd : LogSpectra
+        Logarithms of the stored PER and SD in m, by azimuth.
+    per_rotd50 : LogSpectra
+        Logarithm of the stored median PER over the azimuths, in one row; of one horizontal its PER.
+    """
+
+    north: FloatArray
+    east: FloatArray
+    dt: float
+    horizontals: int
+    sensor_azimuth: float
+    usable_periods: tuple[float, float]
+    azimuths: FloatArray
+    per: LogSpectra
+    sd: LogSpectra
+    per_rotd50: LogSpectra
+
+    @property
+    def components(self) -> tuple[FloatArray, FloatArray, float]:
+        """Accelerations to the north and east, m/s², and the sampling interval, s."""
+        return self.north, self.east, self.dt
+
+
+def station_motion(station: xr.Dataset) -> StationMotion:
+    """Decode the Dataset of one station, once for all its pairs."""
+    north, east, dt = components(station)
+    horizontals = station.sizes["horizontal"]
+    # the azimuth of the sensor is used of a single horizontal only
+    sensor_azimuth = float(station["horizontal_azimuth"][0]) if horizontals == 1 else np.nan
+    shortest = number(station, "shortest_usable_period")
+    longest = number(station, "longest_usable_period")
+    azimuths = station["azimuth"].to_numpy() if "azimuth" in station else np.zeros(1)
+    return StationMotion(
+        north=north,
+        east=east,
+        dt=dt,
+        horizontals=horizontals,
+        sensor_azimuth=sensor_azimuth,
+        usable_periods=(shortest, longest),
+        azimuths=azimuths,
+        per=_by_azimuth(station, "per"),
+        sd=_by_azimuth(station, "sd"),
+        per_rotd50=_median_over_azimuths(station),
+    )
+
+
+def nearest_azimuth(station: StationMotion, table: Table) -> IndexArray:
+    """Return the row of the stored azimuth nearest to ``azimuth_used`` of each pair."""
+    count = station.azimuths.size
+    azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
+    row: IndexArray = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+    return row
+
+
+def _by_azimuth(station: xr.Dataset, name: str) -> LogSpectra:
+    """Return the stored PER (``per``) or SD (``sd``) by azimuth; one horizontal has one azimuth."""
+    by_azimuth = f"{name}_azimuthal"
+    if by_azimuth in station:
+        return _log_spectra(station, station[by_azimuth].to_numpy())
+    return _log_spectra(station, station[name].to_numpy()[:1])
+
+
+def _median_over_azimuths(station: xr.Dataset) -> LogSpectra:
+    """Return the stored RotD50 of PER in one row, or the PER of the only horizontal."""
+    if "per_rotd50" in station:
+        return _log_spectra(station, station["per_rotd50"].to_numpy()[None])
+    return _by_azimuth(station, "per")
+
+
+def _log_spectra(station: xr.Dataset, stored: NDArray[np.float32]) -> LogSpectra:
+    """Return stored radii, (n_rows, n_dampings, n_periods), on logarithmic axes."""
+    # spectra are stored as float32: a radius of 0 counts as the smallest of these
+    radii = np.log(np.maximum(stored.astype(np.float64), np.finfo(np.float32).tiny))
+    dampings = np.log(np.maximum(station["damping"].to_numpy(), SMALLEST_DAMPING))
+    return LogSpectra(np.log(station["period"].to_numpy()), dampings, np.ascontiguousarray(radii))
+
+
+class PairMotion(NamedTuple):
+    """
+    Response of pairs of buildings to a record, (n_pairs, n_azimuths).
+
+    Attributes
+    ----------
+    azimuth : ndarray
+        Of the ground motion, degrees clockwise from north; NaN where the only sensor's azimuth is
+        unknown.
+    per, sd : pairs of ndarray
+        Pseudo energy radius and spectral displacement of the two oscillators, m.
+    correlation : ndarray
+        Of the two responses over all time, dimensionless.
+    """
+
+    azimuth: FloatArray
+    per: Both
+    sd: Both
+    correlation: FloatArray
+
+
+def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
+    """Compute the motion along one azimuth per pair, (n_pairs,), degrees clockwise from north."""
+    period_1, damping_1, period_2, damping_2 = oscillators(pairs)
+    per_1, sd_1 = azimuth_maxima(*station.components, period_1, damping_1, azimuth)
+    per_2, sd_2 = azimuth_maxima(*station.components, period_2, damping_2, azimuth)
+    # every pair has one azimuth: arrays (n_pairs, 1)
+    return PairMotion(
+        azimuth=azimuth[:, None],
+        per=(per_1[:, None], per_2[:, None]),
+        sd=(sd_1[:, None], sd_2[:, None]),
+        correlation=_correlation(station, pairs, azimuth[:, None]),
+    )
+
+
+def motion_of_one_horizontal(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along the only horizontal of a station, whatever the pairs' azimuths."""
+    motion = motion_along_azimuths(station, pairs, np.zeros(len(pairs["azimuth"])))
+    return motion._replace(azimuth=np.full_like(motion.azimuth, station.sensor_azimuth))
+
+
+def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along every degree of the half circle, for pairs of unknown azimuth."""
+    period_1, damping_1, period_2, damping_2 = oscillators(pairs)
+    per_1, sd_1 = _every_radius(station, period_1, damping_1)
+    per_2, sd_2 = _every_radius(station, period_2, damping_2)
+    return PairMotion(
+        azimuth=np.broadcast_to(EVERY_AZIMUTH, per_1.shape),
+        per=(per_1, per_2),
+        sd=(sd_1, sd_2),
+        correlation=_correlation(station, pairs, EVERY_AZIMUTH[None, :]),
+    )
+
+
+def _correlation(station: StationMotion, pairs: Table, azimuths: FloatArray) -> FloatArray:
+    """Return the correlation of both responses along azimuths (n_pairs or 1, n_azimuths)."""
+    return directional_correlation(*station.components, *oscillators(pairs), azimuths)
+
+
+def _every_radius(station: StationMotion, periods: FloatArray, dampings: FloatArray) -> Both:
+    """Return PER and SD along every azimuth, (n, 180); equal oscillators are computed once."""
+    per, sd = np.empty((2, periods.size, EVERY_AZIMUTH.size))
+    for damping in np.unique(dampings):
+        damped = np.flatnonzero(dampings == damping)
+        # one spectrum of the distinct periods serves all oscillators of this damping
+        distinct, position = np.unique(periods[damped], return_inverse=True)
+        spectrum = *station.components, distinct, damping, EVERY_AZIMUTH
+        per[damped] = azimuthal_per_spectrum(*spectrum)[position]
+        sd[damped] = azimuthal_sd_spectrum(*spectrum)[position]
+    return per, sd

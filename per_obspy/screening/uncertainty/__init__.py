@@ -1,1 +1,0 @@
-"""Compute the probability of pounding of pairs."""

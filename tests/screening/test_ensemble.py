@@ -1,0 +1,138 @@
+"""Scenarios together: limits, and pairs that a scenario lacks."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from per_obspy.screening.ensemble import (
+    annual_probability,
+    conditional_probability,
+    ensemble_columns,
+    ensemble_rejections,
+    ensemble_rows,
+)
+
+
+def test_one_scenario_is_itself_and_equal_ones_are_one():
+    chance = np.array([[0.0, 0.3, 1.0]])
+    assert_allclose(conditional_probability(chance, [7.0]), chance[0], rtol=1e-15)
+    assert_allclose(
+        conditional_probability(np.repeat(chance, 3, axis=0), [1, 2, 3]), chance[0], rtol=1e-15
+    )
+
+
+def test_only_the_proportion_of_weights_counts():
+    chance = np.random.default_rng(1).uniform(0, 1, (4, 50))
+    weights = np.array([1.0, 2.0, 0.0, 5.0])
+    got = conditional_probability(chance, weights)
+    assert_allclose(conditional_probability(chance, 1e-3 * weights), got, rtol=1e-13)
+    # a scenario of weight 0 changes no probability
+    assert_allclose(conditional_probability(chance[[0, 1, 3]], weights[[0, 1, 3]]), got, rtol=1e-13)
+    assert ((chance.min(axis=0) <= got) & (got <= chance.max(axis=0))).all()
+
+
+def test_a_year_by_drawing_it():
+    # Poisson numbers of each scenario, each event pounding by its probability: an implementation by
+    # counting
+    random = np.random.default_rng(4)
+    chance, rates = np.array([[0.8], [0.3]]), np.array([0.2, 0.5])
+    events = random.poisson(rates, (200_000, 2))
+    hits = random.binomial(events, chance[:, 0]).sum(axis=1)
+    # standard error of a share near 0.27 of 200 000 years: 0.001
+    assert annual_probability(chance, rates)[0] == pytest.approx((hits > 0).mean(), abs=0.004)
+
+
+def test_rare_scenarios_keep_their_digits():
+    # would catch 1 - exp(-x), which has lost half of its digits at 1e-9
+    assert_allclose(annual_probability([[0.5]], [2e-9]), [1e-9], rtol=1e-8)
+    assert annual_probability([[1.0]], [0.0])[0] == 0.0
+
+
+WEIGHTS = {"near": 3.0, "far": 1.0}
+
+
+def _joined(*rows):
+    """Return pairs at one place whose scenarios were joined, from name and probabilities."""
+    table = pd.DataFrame(rows, columns=["pair_id", "probability_near", "probability_far"])
+    same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
+    # the same severity in both
+    for name in ("near", "far"):
+        severity = {f"expected_impact_velocity_{name}": 0.5}
+        table = table.assign(**severity, **{f"expected_amplification_{name}": np.nan})
+    return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
+
+
+def test_every_pair_has_its_probabilities_and_its_worst_scenario():
+    joined = _joined(("a", 0.2, 0.4), ("b", 0.9, 0.1), ("c", 0.9, 0.1))
+    joined.loc[2, "expected_impact_velocity_far"] = 0.6
+    table = ensemble_rows(joined, WEIGHTS, yearly=False)
+    assert_allclose(table["probability"], [0.25, 0.7, 0.7])
+    # of equal velocities the likelier scenario; a harder impact outranks it
+    assert table["worst_scenario"].tolist() == ["far", "near", "far"]
+    assert list(table) == [
+        name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"
+    ]
+    assert "annual_probability" not in table
+
+
+def test_the_expected_severity_is_the_weighted_mean_of_the_scenarios():
+    joined = _joined(("a", 0.5, 0.0)).assign(
+        expected_impact_velocity_far=8.0, expected_amplification_near=1.6
+    )
+    table = ensemble_rows(joined, WEIGHTS, yearly=False)
+    # three quarters of the weight; an unknown amplification is 1
+    assert_allclose(table["expected_impact_velocity"], 0.75 * 0.5 + 0.25 * 8.0)
+    assert_allclose(table["expected_amplification"], 1.0 + 0.75 * 0.6)
+
+
+def test_rates_give_a_probability_in_a_year_too():
+    table = ensemble_rows(_joined(("a", 1.0, 0.0)), {"near": 0.01, "far": 0.03}, yearly=True)
+    assert_allclose(
+        table["annual_probability"], 0.01 - 0.01**2 / 2, rtol=2e-5
+    )  # the next term is 0.01**3 / 6
+    assert_allclose(table["probability"], 0.25)
+
+
+def test_a_pair_does_not_depend_on_other_pairs():
+    # would catch a matrix product, which adds in another order for other sizes
+    random = np.random.default_rng(6)
+    rows = [(f"p{i}", *random.uniform(0, 1, 2)) for i in range(37)]
+    table = ensemble_rows(_joined(*rows), {"near": 0.3, "far": 0.1}, yearly=True)
+    for i, row in enumerate(rows):
+        alone = ensemble_rows(_joined(row), {"near": 0.3, "far": 0.1}, yearly=True)
+        pd.testing.assert_frame_equal(
+            alone, table.iloc[i : i + 1].reset_index(drop=True), check_exact=True
+        )
+
+
+def test_a_pair_that_a_scenario_lacks_is_rejected_with_its_name():
+    # would catch a missing probability that counts as 0
+    joined = _joined(("a", 0.2, 0.2), ("b", np.nan, np.nan), ("c", 0.1, np.nan))
+    assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
+    rejections = ensemble_rejections(joined, WEIGHTS)
+    reasons = {rejection.name: rejection.reasons[0] for rejection in rejections}
+    assert reasons["b"].startswith("no probability in near, far: ")
+    assert reasons["c"].startswith("no probability in far: ")
+    assert set(reasons) == {"b", "c"}
+
+
+def test_equal_names_of_different_pairs_are_rejected():
+    joined = _joined(("a", 0.2, 0.2), ("b", 0.2, 0.2)).assign(
+        gap_largest=[0.05, 0.3], latitude_largest=[10.0, 11.0]
+    )
+    assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
+    (rejected,) = ensemble_rejections(joined, WEIGHTS)
+    assert rejected.reasons == (
+        "gap = 0.05 m in one scenario and 0.3 m in another",
+        "latitude = 10 degrees in one scenario and 11 degrees in another",
+    )
+
+
+def test_wrong_weights_are_named():
+    with pytest.raises(ValueError, match="weights must have a positive sum, got 0"):
+        conditional_probability([[0.5]], [0.0])
+    with pytest.raises(ValueError, match=r"rates must be zero or more, got -1\.0"):
+        annual_probability([[0.5]], [-1.0])
+    with pytest.raises(ValueError, match=r"weights must be one a scenario \(1\), got 2"):
+        conditional_probability([[0.5]], [1.0, 1.0])
