@@ -234,6 +234,26 @@ def _response(
     record: FloatArray, dt: float, omega: float, damping: float, limit: float, hardening: float
 ) -> BilinearResponse:
     """Return the response of one oscillator with a yield displacement ``limit``, m."""
+    row, history, work = _run(record, dt, omega, damping, limit, hardening)
+
+    # At the samples of the record, then between them and after it too
+    return BilinearResponse(
+        displacement=history[:, 0],
+        velocity=history[:, 1],
+        plastic_displacement=history[:, 2],
+        ductility=float(row[columns.LARGEST_DISPLACEMENT] / limit),
+        hysteretic_energy=float(work[WORK_HYSTERETIC]),
+        displacement_maximum=float(row[columns.LARGEST_DISPLACEMENT]),
+        residual=float((1.0 - hardening) * row[columns.PLASTIC]),
+        displacement_radius=float(np.sqrt(row[columns.LARGEST_RADIUS_SQUARED])),
+        energy_radius=float(np.sqrt(row[columns.LARGEST_ENERGY_RADIUS_SQUARED])),
+    )
+
+
+def _run(
+    record: FloatArray, dt: float, omega: float, damping: float, limit: float, hardening: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the kernel's row at the end, its motion at the samples, and the work done on it."""
     # A row of one structure of unit mass, in steps that are short enough for the kernel
     row = np.zeros((1, columns.ROW_COLUMNS))
     row[0, :6] = damping * omega, omega**2, hardening, limit, 1.0, 1.0
@@ -247,15 +267,4 @@ def _response(
     used = run_history(closed, dt, refinement, row, log, motion, work)
     if used < 0:
         raise RuntimeError(f"no end of yielding and unloading at {-used * dt:g} s")
-    history, (structure,) = motion[: record.size, 0], row
-    return BilinearResponse(
-        displacement=history[:, 0],
-        velocity=history[:, 1],
-        plastic_displacement=history[:, 2],
-        ductility=float(structure[columns.LARGEST_DISPLACEMENT] / limit),
-        hysteretic_energy=float(work[used - 1, 0, WORK_HYSTERETIC]),
-        displacement_maximum=float(structure[columns.LARGEST_DISPLACEMENT]),
-        residual=float((1.0 - hardening) * structure[columns.PLASTIC]),
-        displacement_radius=float(np.sqrt(structure[columns.LARGEST_RADIUS_SQUARED])),
-        energy_radius=float(np.sqrt(structure[columns.LARGEST_ENERGY_RADIUS_SQUARED])),
-    )
+    return row[0], motion[: record.size, 0], work[used - 1, 0]

@@ -1,9 +1,9 @@
 """
 Deferred search for maxima between samples: a tile is searched once no later sample exceeds it.
 
-While a motion grows most tiles are never searched. Each structure of a lane has one deferred tile
-at most. A tile that is deferred while another one may still hold more has that one searched first,
-as has every change of the pair's equations.
+While a motion grows most tiles are never searched. Each building has one deferred tile at most. A
+tile that is deferred while another one may still hold more has that one searched first, as has
+every change of the row's equations.
 """
 
 from typing import NamedTuple
@@ -15,14 +15,13 @@ from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.motion import LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
-    LANE_ROWS,
+    IS_CHANGED,
     MAXIMUM_SO_FAR,
-    PAIR_LANES,
-    PEAK_FLAGS,
     RADIUS_SQUARED_SO_FAR,
     START_DISPLACEMENT,
     START_VELOCITY,
     STRUCTURE_ROWS,
+    SWEPT_ROWS,
     TILE_DISPLACEMENT_ERROR,
     TILE_HIGH,
     TILE_LOW,
@@ -34,7 +33,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 
-# columns of the deferred tile of a structure
+# columns of the deferred tile of a building
 #: first step, number of steps (0: no tile is deferred)
 FIRST_STEP, STEP_COUNT = 0, 1
 #: displacement and velocity over omega at its start (m)
@@ -91,30 +90,42 @@ def fill_ground(record, step, ground):
 
 
 @lean
-def read_states(lanes, lane, pair):
-    """Copy the states of a lane, now and at the start of the tile, to the line of its pair."""
-    for first in (0, STRUCTURE_ROWS):
-        for k in (DISPLACEMENT, VELOCITY, START_DISPLACEMENT, START_VELOCITY):
-            pair[first + k] = lanes[at(first + k, lane)]
+def read_states(lanes, place, members, own):
+    """Copy the states of a building, now and at the start of the tile, to its line."""
+    for k in (DISPLACEMENT, VELOCITY, START_DISPLACEMENT, START_VELOCITY):
+        members[own + k] = lanes[at(k, place)]
 
 
 @lean
-def read_lane(lanes, lane, pair):
-    """Copy the numbers of a lane to a line."""
-    for k in range(LANE_ROWS):
-        pair[k] = lanes[k * PAIR_LANES + lane]
+def write_lane(lanes, place, members, own):
+    """Copy the line of a building to its lane."""
+    for k in range(SWEPT_ROWS):
+        lanes[at(k, place)] = members[own + k]
+    members[own + IS_CHANGED] = 0.0
 
 
 @lean
-def write_lane(lanes, lane, pair):
-    """Copy a line to its lane."""
-    for k in range(LANE_ROWS):
-        lanes[k * PAIR_LANES + lane] = pair[k]
+def write_back(lanes, place, members, row, i):
+    """Copy building i back to its lane, with the maxima of its row, and coefficients if new."""
+    own = i * STRUCTURE_ROWS
+    if members[own + IS_CHANGED] != 0.0:
+        write_lane(lanes, place, members, own)
+    # state and maxima
+    lanes[at(DISPLACEMENT, place)] = members[own + DISPLACEMENT]
+    lanes[at(VELOCITY, place)] = members[own + VELOCITY]
+    write_maxima(lanes, place, row, i)
+
+
+@lean
+def write_maxima(lanes, place, row, i):
+    """Copy the maxima of building i from its row to its lane."""
+    lanes[at(MAXIMUM_SO_FAR, place)] = row[i, LARGEST_DISPLACEMENT]
+    lanes[at(RADIUS_SQUARED_SO_FAR, place)] = row[i, LARGEST_RADIUS_SQUARED]
 
 
 @lean
 def may_hold_maximum(deferred, row, i):
-    """Return whether structure i has a deferred tile that may exceed its maxima so far."""
+    """Return whether building i has a deferred tile that may exceed its maxima so far."""
     return (deferred[i, STEP_COUNT] > 0.0) & (
         (deferred[i, DISPLACEMENT_BOUND] > row[i, LARGEST_DISPLACEMENT])
         | (deferred[i, RADIUS_SQUARED_BOUND] > row[i, LARGEST_RADIUS_SQUARED])
@@ -122,67 +133,35 @@ def may_hold_maximum(deferred, row, i):
 
 
 @lean
-def search_deferred(lanes, lane, pair, row, deferred, record, ground):
-    """Search the deferred tiles of a lane that may hold a maximum; no tile remains deferred."""
-    for i in range(2):
-        if may_hold_maximum(deferred, row, i):
-            # ground motion of the tile
-            fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
-            # maxima of the tile
-            u = deferred[i, FIRST_DISPLACEMENT]
-            z = deferred[i, FIRST_VELOCITY]
-            search_tile(pair, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
-            first = i * STRUCTURE_ROWS
-            lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
-            lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
-        deferred[i, STEP_COUNT] = 0.0
+def search_deferred(lanes, place, members, row, i, deferred, record, ground):
+    """Search the deferred tile of building i if it may hold a maximum; none remains deferred."""
+    if may_hold_maximum(deferred, row, i):
+        # ground motion of the tile, then its maxima
+        fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
+        u = deferred[i, FIRST_DISPLACEMENT]
+        z = deferred[i, FIRST_VELOCITY]
+        search_tile(members, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
+        write_maxima(lanes, place, row, i)
+    deferred[i, STEP_COUNT] = 0.0
 
 
 @lean
-def raise_maxima_to_samples(lanes, lane, row, i):
-    """Raise the maxima of structure i of a lane to those at the samples of the tile."""
-    first = i * STRUCTURE_ROWS
-    # in the row
-    row[i, LARGEST_DISPLACEMENT] = max(
-        row[i, LARGEST_DISPLACEMENT],
-        lanes[at(first + TILE_HIGH, lane)],
-        -lanes[at(first + TILE_LOW, lane)],
-    )
-    row[i, LARGEST_RADIUS_SQUARED] = max(
-        row[i, LARGEST_RADIUS_SQUARED], lanes[at(first + TILE_RADIUS_SQUARED, lane)]
-    )
-    # in the lane
-    lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
-    lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
-
-
-@lean
-def defer_tile(lanes, lane, deferred, i, step, count):
-    """Defer the search of the tile from a step on for structure i of a lane."""
-    first = i * STRUCTURE_ROWS
+def raise_maxima_of_tile(lanes, place, members, row, i, deferred, record, ground, step, count):
+    """Raise the maxima of building i to the samples of the tile from a step on, and defer it."""
+    high = lanes[at(TILE_HIGH, place)]
+    reach = max(high, -lanes[at(TILE_LOW, place)])
+    radius_squared = lanes[at(TILE_RADIUS_SQUARED, place)]
+    row[i, LARGEST_DISPLACEMENT] = max(row[i, LARGEST_DISPLACEMENT], reach)
+    row[i, LARGEST_RADIUS_SQUARED] = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
+    write_maxima(lanes, place, row, i)
+    # an earlier tile may still hold more
+    if may_hold_maximum(deferred, row, i):
+        search_deferred(lanes, place, members, row, i, deferred, record, ground)
     # steps and state at the start
     deferred[i, FIRST_STEP] = step
     deferred[i, STEP_COUNT] = count
-    deferred[i, FIRST_DISPLACEMENT] = lanes[at(first + START_DISPLACEMENT, lane)]
-    deferred[i, FIRST_VELOCITY] = lanes[at(first + START_VELOCITY, lane)]
+    deferred[i, FIRST_DISPLACEMENT] = lanes[at(START_DISPLACEMENT, place)]
+    deferred[i, FIRST_VELOCITY] = lanes[at(START_VELOCITY, place)]
     # bounds of its maxima
-    reach = max(lanes[at(first + TILE_HIGH, lane)], -lanes[at(first + TILE_LOW, lane)])
-    error = lanes[at(first + TILE_DISPLACEMENT_ERROR, lane)]
-    deferred[i, DISPLACEMENT_BOUND] = reach + error
-    deferred[i, RADIUS_SQUARED_BOUND] = lanes[at(first + TILE_RADIUS_SQUARED_BOUND, lane)]
-
-
-@lean
-def raise_maxima_of_tile(lanes, lane, flag, pair, row, deferred, record, ground, step, count):
-    """Raise the maxima of a lane to the samples of a tile without events, and defer its search."""
-    may_hold = False
-    for i in range(2):
-        if flag & PEAK_FLAGS[i]:
-            raise_maxima_to_samples(lanes, lane, row, i)
-            may_hold |= may_hold_maximum(deferred, row, i)
-    # an earlier tile may still hold more
-    if may_hold:
-        search_deferred(lanes, lane, pair, row, deferred, record, ground)
-    for i in range(2):
-        if flag & PEAK_FLAGS[i]:
-            defer_tile(lanes, lane, deferred, i, step, count)
+    deferred[i, DISPLACEMENT_BOUND] = reach + lanes[at(TILE_DISPLACEMENT_ERROR, place)]
+    deferred[i, RADIUS_SQUARED_BOUND] = lanes[at(TILE_RADIUS_SQUARED_BOUND, place)]

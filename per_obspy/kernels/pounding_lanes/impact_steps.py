@@ -63,11 +63,10 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     YIELD_SIDE,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
-    may_exceed_maxima,
     may_yield,
-    raise_maxima_inside,
+    raise_maxima,
 )
-from per_obspy.kernels.pounding_lanes.pair_rows import load_pair
+from per_obspy.kernels.pounding_lanes.phases import load_row
 
 #: Displacement and rate at the start of a step by a unit rate there.
 AT_START = (0.0, 1.0)
@@ -189,7 +188,7 @@ def _note_impact(pair, row, log, left, right, approach, time):
     """Note an impact of a pair in two states: a line of the log only if it may count."""
     if approach > max(SLOWEST_COUNTED, COUNTED_SHARE * row[0, APPROACH]):
         set_states(pair, left, right)
-        load_pair(pair, row)
+        load_row(pair, row)
         apply_impact(row, log, 0, time)
     else:
         row[0, APPROACH] = max(row[0, APPROACH], approach)
@@ -201,15 +200,6 @@ def _faster(pair, first, state, growth):
     """Return a state with so much more velocity."""
     u, z, y = state
     return u, z + growth, y + pair[first + ACCELERATION + 1] * growth
-
-
-@inlined
-def _raise_both(pair, row, left, right, next_left, next_right, change, share):
-    """Raise the maxima of both structures to those of a piece."""
-    if may_exceed_maxima(pair, row, 0, left, next_left):
-        raise_maxima_inside(pair, row, 0, left, next_left, change, share)
-    if may_exceed_maxima(pair, row, 1, right, next_right):
-        raise_maxima_inside(pair, row, 1, right, next_right, change, share)
 
 
 @inlined
@@ -309,7 +299,9 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         approach = -opening_rate(pair, hit_left, hit_right)
         if share < 0.0 or (share <= remaining and approach <= row[0, STICKING_SPEED]):
             break
-        _raise_both(pair, row, left, right, hit_left, hit_right, change, min(share, remaining))
+        piece = min(share, remaining)
+        raise_maxima(pair, row, 0, left, hit_left, change, piece)
+        raise_maxima(pair, row, 1, right, hit_right, change, piece)
         # no further impact: the end of the step
         if share > remaining:
             set_states(pair, next_left, next_right)
@@ -320,7 +312,7 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         time = segment.start + elapsed * segment.duration
         _note_impact(pair, row, log, hit_left, hit_right, approach, time)
         growth = pair[IMPACT_GROWTH] * approach
-        other_growth = pair[IMPACT_GROWTH + 1] * approach
+        other_growth = pair[STRUCTURE_ROWS + IMPACT_GROWTH] * approach
         left = _faster(pair, 0, hit_left, growth)
         right = _faster(pair, STRUCTURE_ROWS, hit_right, other_growth)
         if _bounces_end(pair, row, left, right):
@@ -334,6 +326,6 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         return -1.0
     # the row stays at the last impact
     set_states(pair, left, right)
-    load_pair(pair, row)
+    load_row(pair, row)
     resolve_contact(row, log, segment, elapsed * segment.duration, 0)
     return elapsed * segment.duration

@@ -94,13 +94,15 @@ def may_yield(pair, first, start, end):
 
 
 @inlined
-def may_exceed_maxima(pair, row, i, start, end):
+def raise_maxima(pair, row, i, start, end, change, share):
     """
-    Raise the maxima of structure i to two states; return whether it may pass them in between.
+    Raise the maxima of structure i to those of a piece of a step, exact between its ends.
 
-    The states are at most a step apart. The radius grows with the angle by the power p = u'' +
-    omega² u at most, which in a step is within its chord and its error bound: by ``growth`` from a
-    root to the nearer end. And its square by growth (2 r + growth), with r below |u| + |z|.
+    ``start`` and ``end`` are states this ``share`` of a step apart; over a complete step the ground
+    changes by ``change``. The radius grows with the angle by the power p = u'' + omega² u at most,
+    which in a step is within its chord and its error bound: by ``growth`` from a root to the nearer
+    end. And its square by growth (2 r + growth), with r below |u| + |z|. The errors of displacement
+    and power grow at least as fast as the share.
 
     Most motion is far below its maxima. No displacement exceeds the radius, and the power changes
     by ``2 r + 2 strength`` at most, with the larger radius r and the larger acceleration of both
@@ -112,26 +114,53 @@ def may_exceed_maxima(pair, row, i, start, end):
     strength = max(abs(y0), abs(y1))
     radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
     # far below the maxima
-    quarter = 0.25 * pair[first + ANGLE]
+    quarter = 0.25 * share * pair[first + ANGLE]
     widening = 1.0 + quarter
-    by_strength = quarter * (1.0 + 4.0 * pair[first + POWER_ERROR])
+    by_strength = quarter * (1.0 + 4.0 * share * pair[first + POWER_ERROR])
     room = row[i, LARGEST_DISPLACEMENT] - by_strength * strength
-    if (room > 0.0) & (widening * widening * radius_squared < room * room):
-        return False
-    # growth of the radius between the states
-    power_change = abs((u1 + y1) - (u0 + y0))
-    power_error = 8.0 * pair[first + POWER_ERROR] * strength
-    growth = 0.5 * quarter * (power_change + power_error)
+    if not ((room > 0.0) & (widening * widening * radius_squared < room * room)):
+        # to both ends, then between them
+        _raise_nearby(pair, row, i, start, end, change, share)
+
+
+@inlined
+def _raise_to_ends(pair, row, i, start, end, share):
+    """
+    Raise the maxima of structure i to two states.
+
+    Return whether its displacement may turn, and its radius, beyond them in between.
+    """
+    first = i * STRUCTURE_ROWS
+    u0, z0, y0 = start
+    u1, z1, y1 = end
+    strength = max(abs(y0), abs(y1))
+    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
     # maxima at the states
     reach = max(abs(u0), abs(u1))
     largest = max(row[i, LARGEST_DISPLACEMENT], reach)
     largest_squared = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
     row[i, LARGEST_DISPLACEMENT] = largest
     row[i, LARGEST_RADIUS_SQUARED] = largest_squared
-    # bounds between them
+    # the displacement turns where the velocity, within its error, has a root
+    velocity_error = 2.0 * share * pair[first + VELOCITY_ERROR] * strength
+    turns = abs(z0 + z1) <= abs(z1 - z0) + velocity_error
+    turns &= reach + share * share * pair[first + DISPLACEMENT_ERROR] * strength > largest
+    # the radius turns where the power, within its error, has a root; what it grows by from there
+    power_change = abs((u1 + y1) - (u0 + y0))
+    power_error = share * pair[first + POWER_ERROR] * strength
+    growth = 0.125 * share * pair[first + ANGLE] * (power_change + 8.0 * power_error)
+    widens = abs(u0 + u1 + y0 + y1) <= power_change + 2.0 * power_error
     twice_radius = 2.0 * max(abs(u0) + abs(z0), abs(u1) + abs(z1))
-    is_further = reach + pair[first + DISPLACEMENT_ERROR] * strength > largest
-    return is_further | (radius_squared + growth * (twice_radius + growth) > largest_squared)
+    widens &= radius_squared + growth * (twice_radius + growth) > largest_squared
+    return turns, widens
+
+
+@lean
+def _raise_nearby(pair, row, i, start, end, change, share):
+    """Raise the maxima of structure i to those of a piece that may hold larger ones."""
+    turns, widens = _raise_to_ends(pair, row, i, start, end, share)
+    if turns | widens:
+        _raise_inside(pair, row, i, start, end, change, share, turns, widens)
 
 
 @inlined
@@ -209,31 +238,11 @@ def turning_point(pair, row, i, start, end, change, share):
 
 
 @lean
-def raise_maxima_inside(pair, row, i, start, end, change, share):
-    """
-    Raise the maxima of structure i to those between two states: at roots of velocity and power.
-
-    They are this share of a step apart; over a complete step the ground changes by ``change``.
-    """
-    u0, z0, y0 = start
-    u1, z1, y1 = end
+def _raise_inside(pair, row, i, start, end, change, share, turns, widens):
+    """Raise the maxima of structure i to those at roots of the velocity, and of the power."""
     first = i * STRUCTURE_ROWS
-    strength = max(abs(y0), abs(y1))
     terms = int(row[0, TERM_COUNT])
     angle = pair[first + ANGLE]
-    # the displacement turns where the velocity, within its error bound, has a root
-    velocity_error = 2.0 * pair[first + VELOCITY_ERROR] * strength
-    turns = abs(z0 + z1) <= abs(z1 - z0) + velocity_error
-    reach = max(abs(u0), abs(u1)) + pair[first + DISPLACEMENT_ERROR] * strength
-    turns &= reach > row[i, LARGEST_DISPLACEMENT]
-    # the radius turns where the power, within its error bound, has a root
-    power_change = abs((u1 + y1) - (u0 + y0))
-    power_error = pair[first + POWER_ERROR] * strength
-    radius = math.sqrt(max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)) + 0.125 * angle * (
-        power_change + 8.0 * power_error
-    )
-    widens = abs(u0 + u1 + y0 + y1) <= power_change + 2.0 * power_error
-    widens &= radius * radius > row[i, LARGEST_RADIUS_SQUARED]
     # a displacement that turns once
     if turns:
         turn = turning_point(pair, row, i, start, end, change, share)
@@ -297,7 +306,6 @@ def search_tile(pair, row, i, displacement, velocity, ground, count):
     for k in range(1, count + 1):
         ground_end = ground_along(pair, ground, k)
         after = state_after_step(pair, first, state, ground_start, ground_end)
-        if may_exceed_maxima(pair, row, i, state, after):
-            raise_maxima_inside(pair, row, i, state, after, ground_end - ground_start, 1.0)
+        raise_maxima(pair, row, i, state, after, ground_end - ground_start, 1.0)
         state = after
         ground_start = ground_end

@@ -127,6 +127,34 @@ def _moves_as_one(row, first, last):
 
 
 @lean
+def _square_of_norm(row, i, rate):
+    """Return the norm of a building squared, over its mass, m²/s²."""
+    u = row[i, U] - _centre(row, i)
+    v = row[i, V]
+    return max(v * v + 2.0 * rate * u * v + row[i, STIFFNESS] * u * u, 0.0)
+
+
+@lean
+def _room(row, i):
+    """Return by how far a building may leave its centre so that it passes no maximum or yields."""
+    centre = _centre(row, i)
+    within_range = row[i, YIELD] - abs(row[i, PLASTIC] - centre)
+    return min(row[i, LARGEST_DISPLACEMENT] - abs(centre), within_range)
+
+
+@lean
+def _slow_norm(row, j, rate):
+    """Return the norm below which no impact of an interface counts, and none is its fastest."""
+    slowness = 0.0
+    for i in range(j, j + 2):
+        slowness += 1.0 / (row[i, MASS] * (1.0 - rate * rate / row[i, STIFFNESS]))
+    # the slower limit of both
+    fastest = row[j, APPROACH]
+    speed = min(fastest, max(row[j, COUNTED_SPEED], COUNTED_SHARE * fastest))
+    return speed / math.sqrt(slowness)
+
+
+@lean
 def _write_bounds(row, first, last, duration):
     """Write the bounds of a group; return whether it has any, and is below its limit."""
     rate = math.inf
@@ -143,33 +171,25 @@ def _write_bounds(row, first, last, duration):
         hidden = rate * rate / stiffness
         if row[i, PHASE] != 0.0 or mass == math.inf or (hidden > 0.5 and not is_one):
             return False
-        centre = _centre(row, i)
-        u = row[i, U] - centre
-        v = row[i, V]
-        own = mass * max(v * v + 2.0 * rate * u * v + stiffness * u * u, 0.0)
+        own = mass * _square_of_norm(row, i, rate)
         drive = mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
         square = own if is_one else square + own
         force = drive if is_one else force + drive
         excess = max(excess, (row[i, DAMPING_RATE] - rate) * hidden / (1.0 - hidden))
-        # largest displacement, and with it the largest radius; it yields no more
-        room = row[i, LARGEST_DISPLACEMENT] - abs(centre)
-        room = min(room, row[i, YIELD] - abs(row[i, PLASTIC] - centre))
+        # largest displacement, and with it the largest radius
+        room = _room(row, i)
         limit = min(limit, room * math.sqrt(stiffness * mass * (1.0 - math.sqrt(hidden))))
         row[i, REACH] = 1.0 / math.sqrt(mass * (stiffness - rate * rate))
-        # impacts: none that counts, and none that is the fastest of its interface
         if i < last and not is_one:
-            slowness = 0.0
-            for k in range(i, i + 2):
-                slowness += 1.0 / (row[k, MASS] * (1.0 - rate * rate / row[k, STIFFNESS]))
-            fastest = row[i, APPROACH]
-            speed = min(fastest, max(row[i, COUNTED_SPEED], COUNTED_SHARE * fastest))
-            limit = min(limit, speed / math.sqrt(slowness))
+            limit = min(limit, _slow_norm(row, i, rate))
     # all of the group, in its first line
     row[first, NORM] = math.sqrt(square)
     row[first, LIMIT] = CERTAIN * limit
+    if not row[first, NORM] < row[first, LIMIT] or excess > 2.0 * rate:
+        return False
     row[first, DECAY] = math.exp(-(rate - 0.5 * excess) * duration)
     row[first, GAIN] = math.sqrt(force)
-    return row[first, NORM] < row[first, LIMIT] and excess <= 2.0 * rate
+    return True
 
 
 @lean

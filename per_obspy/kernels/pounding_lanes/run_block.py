@@ -1,144 +1,312 @@
-"""Histories of 32 pairs at once: the loop over the record and the free vibration after it."""
+"""The life of a lane: histories of rows in 32 lanes, through a record and what follows it."""
 
-from per_obspy.kernels._jit import lean
+import numpy as np
+from numpy.typing import NDArray
+
+from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels.pounding_events.motion import OPENING
 from per_obspy.kernels.pounding_events.row_history import is_settled
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
+    Record,
     fill_ground,
+    raise_maxima_of_tile,
     read_states,
     search_deferred,
+    write_back,
     write_lane,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
-    AXIS_COSINE,
-    AXIS_SINE,
-    IS_CHANGED,
+    APART,
+    BANK,
+    EVENT_FLAG,
     PAIR_LANES,
+    PAIRS,
+    PEAK_FLAGS,
+    RELATIVE_SO_FAR,
+    ROWS,
+    STRUCTURE_ROWS,
     TILE_STEPS,
+    at,
     sweep_tile,
 )
-from per_obspy.kernels.pounding_lanes.pair_rows import (
-    load_pair,
-    rest_pair,
-    write_constants,
-    write_phase,
-)
+from per_obspy.kernels.pounding_lanes.phases import load_row, rest_row, write_constants
+from per_obspy.kernels.pounding_lanes.relative_in_step import is_relative_settled
 from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES, remains_still
-from per_obspy.kernels.pounding_lanes.step_by_step import treat_flagged_lane
+from per_obspy.kernels.pounding_lanes.step_by_step import step_through_tile
+from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 
-#: Sampling intervals of free vibration between two checks whether a pair is settled.
+#: Sampling intervals of free vibration between two checks whether a row is settled.
 SETTLING_STEPS = 16
 #: Groups of samples of the record between two checks whether the rest of it counts.
 GROUPS_BETWEEN_CHECKS = 8
+#: Gap that no structure reaches, and relative displacement that none passes, m.
+UNREACHABLE = 1e12
+
+
+@inlined
+def _row_of(kind, memory, firsts, number):
+    """Return what belongs to a row: first place, stride, numbers, lines, log, deferred tiles."""
+    members, lines, logs, deferred, states, window = memory
+    # pairs have one lane each
+    first, end = firsts[number], firsts[number + 1]
+    place, stride = (first, 1) if kind == ROWS else (number, BANK)
+    own = members[first * STRUCTURE_ROWS : end * STRUCTURE_ROWS]
+    rooms = states, window
+    return place, stride, own, lines[first:end], logs[number], deferred[first:end], rooms
 
 
 @lean
-def prepare_block(lanes, pairs, rows, cosine, sine, free_steps, duration):
-    """Set all lanes to rest, for good those without a pair (``free_steps`` < 0)."""
-    for lane in range(PAIR_LANES):
-        pair = pairs[lane]
-        pair[:] = 0.0
-        write_constants(pair, rows[lane], cosine[lane], sine[lane], duration)
-        write_phase(pair, rows[lane], duration)
-        if free_steps[lane] < 0:
-            rest_pair(pair)
-        pair[IS_CHANGED] = 0.0
-        write_lane(lanes, lane, pair)
+def _write_relative(lanes, place, row):
+    """Copy the largest relative displacements of a pair that never touches to its lane."""
+    lanes[at(RELATIVE_SO_FAR, place)] = row[0, OPENING]
+    lanes[at(RELATIVE_SO_FAR + 1, place)] = row[1, OPENING]
 
 
 @lean
-def advance_block(lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last):
+def _rest(kind, lanes, place, stride, members, row):
+    """Set the lanes of a row to rest for good."""
+    rest_row(members, row.shape[0])
+    for i in range(row.shape[0]):
+        write_lane(lanes, place + i * stride, members, i * STRUCTURE_ROWS)
+    if kind == APART:
+        lanes[at(RELATIVE_SO_FAR, place)] = UNREACHABLE
+        lanes[at(RELATIVE_SO_FAR + 1, place)] = UNREACHABLE
+
+
+@lean
+def _prepare(kind, lanes, memory, firsts, cosine, sine, free_steps, duration):
+    """Set all rows to rest in their lanes, for good those with negative ``free_steps``."""
+    # lanes without a building
+    for k in range(lanes.size):
+        lanes[k] = 0.0
+    members = memory[0]
+    for lane in range(firsts[firsts.size - 1], PAIR_LANES):
+        own = members[lane * STRUCTURE_ROWS : (lane + 1) * STRUCTURE_ROWS]
+        rest_row(own, 1)
+        write_lane(lanes, lane, own, 0)
+    # rows
+    for number in range(firsts.size - 1):
+        place, stride, own, row, _, _, _ = _row_of(kind, memory, firsts, number)
+        write_constants(own, row, cosine[number], sine[number], duration)
+        for i in range(row.shape[0]):
+            write_lane(lanes, place + i * stride, own, i * STRUCTURE_ROWS)
+        if free_steps[number] < 0:
+            _rest(kind, lanes, place, stride, own, row)
+
+
+@inlined
+def _flags_of(kind, flags, firsts, number):
+    """Return the flags of a row; both buildings of a pair have theirs in one lane."""
+    if kind != ROWS:
+        return flags[number]
+    together = 0
+    for lane in range(firsts[number], firsts[number + 1]):
+        together |= flags[lane]
+    return together
+
+
+@lean
+def _treat(kind, lanes, flags, together, memory, firsts, number, record, grounds, step, count):
+    """Treat a row with such flags in all after the sweep; return whether it got through."""
+    place, stride, own, row, log, deferred, rooms = _row_of(kind, memory, firsts, number)
+    if not together & EVENT_FLAG:
+        # maxima only
+        for i in range(row.shape[0]):
+            if kind == ROWS:
+                is_peak = flags[place + i] & PEAK_FLAGS[0]
+            else:
+                is_peak = flags[place] & (PEAK_FLAGS[1] if i else PEAK_FLAGS[0])
+            if is_peak:
+                here = place + i * stride
+                raise_maxima_of_tile(
+                    lanes, here, own, row, i, deferred, record, grounds[1], step, count
+                )
+        return True
+    # an event: earlier maxima first, then the tile again from its start
+    for i in range(row.shape[0]):
+        here = place + i * stride
+        search_deferred(lanes, here, own, row, i, deferred, record, grounds[1])
+        read_states(lanes, here, own, i * STRUCTURE_ROWS)
+    # the steps of any row, or those of two buildings
+    if kind == ROWS:
+        is_through = step_row_through_tile(
+            own, row, log, rooms[0], rooms[1], grounds[0], count, record.duration
+        )
+    else:
+        is_through = step_through_tile(
+            own, row, log, grounds[0], count, record.duration, kind == APART
+        )
+    for i in range(row.shape[0]):
+        write_back(lanes, place + i * stride, own, row, i)
+    if kind == APART:
+        _write_relative(lanes, place, row)
+    return is_through
+
+
+@lean
+def _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     is_through = True
     while step < last:
         # all lanes side by side through one tile
         fill_ground(record, step, grounds[0])
         count = min(TILE_STEPS, last - step)
-        if sweep_tile(lanes, flags, grounds[0], count):
-            # flagged lanes one by one
-            for lane in range(PAIR_LANES):
-                if flags[lane]:
-                    memory = pairs[lane], rows[lane], logs[lane], deferred[lane]
-                    is_through &= treat_flagged_lane(
-                        lanes, lane, flags[lane], memory, record, grounds, step, count
+        if sweep_tile(kind, lanes, flags, grounds[0], count):
+            # flagged rows one by one
+            for number in range(firsts.size - 1):
+                together = _flags_of(kind, flags, firsts, number)
+                if together:
+                    is_through &= _treat(
+                        kind,
+                        lanes,
+                        flags,
+                        together,
+                        memory,
+                        firsts,
+                        number,
+                        record,
+                        grounds,
+                        step,
+                        count,
                     )
         step += count
     return is_through
 
 
 @lean
-def _is_over(pair, row, record, group):
-    """Return whether no result of a pair changes from a group of samples on."""
+def _retire(kind, lanes, memory, firsts, cosine, sine, record, grounds, free_steps, group, elapsed):
+    """
+    Rest the rows whose result no longer changes from a group of samples of the record on.
+
+    Or, after the last group, after so many sampling intervals of free vibration. Return the number
+    of the others.
+    """
+    active = 0
+    is_free = group == record.sizes.shape[1]
     duration = GROUP_SAMPLES * record.refinement * record.duration
-    cosine, sine = pair[AXIS_COSINE], pair[AXIS_SINE]
-    return remains_still(row, cosine, sine, record.sizes, duration, group)
-
-
-@lean
-def retire_still_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, group):
-    """
-    Rest the lanes whose result no longer changes in the rest of the record.
-
-    Return the number of the others.
-    """
-    active = 0
-    for lane in range(PAIR_LANES):
-        if free_steps[lane] >= 0:
-            # maxima of deferred tiles are larger still: a lane that is over now is over with them
-            pair = pairs[lane]
-            read_states(lanes, lane, pair)
-            load_pair(pair, rows[lane])
-            if _is_over(pair, rows[lane], record, group):
-                search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
-                free_steps[lane] = -1
-                rest_pair(pair)
-                write_lane(lanes, lane, pair)
-            else:
-                active += 1
+    for number in range(firsts.size - 1):
+        if free_steps[number] < 0:
+            continue
+        # the state as a row; maxima of deferred tiles are larger still: a row that is over now is
+        # over with them
+        place, stride, own, row, _, deferred, _ = _row_of(kind, memory, firsts, number)
+        for i in range(row.shape[0]):
+            here = place + i * stride
+            if is_free:
+                search_deferred(lanes, here, own, row, i, deferred, record, grounds[1])
+            read_states(lanes, here, own, i * STRUCTURE_ROWS)
+        load_row(own, row)
+        if kind == APART:
+            is_over = is_free and is_relative_settled(row)
+        else:
+            is_over = (is_free and is_settled(row)) or remains_still(
+                row, cosine[number], sine[number], record.sizes, duration, group
+            )
+        # at rest from now on
+        if is_over or (is_free and elapsed >= free_steps[number]):
+            for i in range(row.shape[0]):
+                here = place + i * stride
+                search_deferred(lanes, here, own, row, i, deferred, record, grounds[1])
+            free_steps[number] = -1
+            _rest(kind, lanes, place, stride, own, row)
+        else:
+            active += 1
     return active
 
 
 @lean
-def retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
+def run_lanes(kind, record, lanes, flags, grounds, memory, firsts, cosine, sine, free_steps):
     """
-    Rest the lanes whose result is final after so many sampling intervals of free vibration.
-
-    Return the number of the others.
-    """
-    active = 0
-    for lane in range(PAIR_LANES):
-        if free_steps[lane] >= 0:
-            # maxima so far, and the state as a row
-            pair = pairs[lane]
-            search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
-            read_states(lanes, lane, pair)
-            load_pair(pair, rows[lane])
-            is_over = is_settled(rows[lane])
-            if not is_over:
-                is_over = _is_over(pair, rows[lane], record, record.sizes.shape[1])
-            if elapsed >= free_steps[lane] or is_over:
-                free_steps[lane] = -1
-                rest_pair(pair)
-                write_lane(lanes, lane, pair)
-            else:
-                active += 1
-    return active
-
-
-@lean
-def run_block(record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine, sine, free_steps):
-    """
-    Run 32 pairs through a record and the free vibration after it.
+    Run rows of buildings side by side through a record and the free vibration after it.
 
     Parameters
     ----------
+    kind : int
+        PAIRS, APART (pairs that never touch) or ROWS.
     record : Record
         Ground motion and the steps through it.
-    lanes : (LANE_ROWS * PAIR_LANES,) ndarray
+    lanes : (n_lane_rows * PAIR_LANES,) ndarray
         Room for the numbers of all lanes.
     flags : (PAIR_LANES,) ndarray of int
         Room for their flags.
     grounds : (2, 2, TILE_STEPS + 1) ndarray
         Room for the north and east acceleration of the current tile and of a deferred one.
+    memory : tuple of ndarray
+        Room for lines of lanes (n_buildings * STRUCTURE_ROWS,); lines of all buildings
+        (n_buildings, ROW_COLUMNS) at rest, then at the end, see `motion` for the columns; logs
+        (n_rows, n_lines, LOG_COLUMNS), which receive one line per impact that may count as long as
+        there is room; deferred tiles (n_buildings, DEFERRED_COLUMNS), zero at the start; room for
+        the states of a row (n_buildings, STATE_COLUMNS) and a window (WINDOW_SIZE,), zero at the
+        start, for ROWS only.
+    firsts : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    cosine, sine : (n_rows,) ndarray
+        Of the azimuth of the axis of each row.
+    free_steps : (n_rows,) ndarray of int
+        Largest number of sampling intervals of free vibration for each row, negative for one that
+        is left out; it is overwritten.
+
+    Returns
+    -------
+    bool
+        Whether all rows got through: no step had too many events.
+    """
+    _prepare(kind, lanes, memory, firsts, cosine, sine, free_steps, record.duration)
+    # the record, as far as any row needs it
+    last = (record.components.shape[1] - 1) * record.refinement
+    groups = record.sizes.shape[1]
+    group = 0
+    is_through = True
+    active = firsts.size - 1
+    while active and group < groups:
+        step = group * GROUP_SAMPLES * record.refinement
+        group = min(group + GROUPS_BETWEEN_CHECKS, groups)
+        end = min(group * GROUP_SAMPLES * record.refinement, last)
+        is_through &= _advance(kind, lanes, flags, memory, firsts, record, grounds, step, end)
+        if group < groups:
+            active = _retire(
+                kind, lanes, memory, firsts, cosine, sine, record, grounds, free_steps, group, -1
+            )
+    # free vibration, until every row is settled
+    elapsed = 0
+    while _retire(
+        kind, lanes, memory, firsts, cosine, sine, record, grounds, free_steps, groups, elapsed
+    ):
+        step = last
+        last += SETTLING_STEPS * record.refinement
+        is_through &= _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last)
+        elapsed += SETTLING_STEPS
+    return is_through
+
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: First building of each of 32 pairs, and the number of buildings.
+FIRSTS_OF_PAIRS = 2 * np.arange(PAIR_LANES + 1)
+
+
+def run_block(
+    record: Record,
+    lanes: Floats,
+    flags: Integers,
+    grounds: Floats,
+    pairs: Floats,
+    deferred: Floats,
+    rows: Floats,
+    logs: Floats,
+    cosine: Floats,
+    sine: Floats,
+    free_steps: Integers,
+    kind: int = PAIRS,
+) -> bool:
+    """
+    Run 32 pairs through a record and the free vibration after it, as `run_lanes`.
+
+    Parameters
+    ----------
+    record, lanes, flags, grounds, logs, cosine, sine, free_steps
+        As in `run_lanes`.
     pairs : (PAIR_LANES, LANE_ROWS) ndarray
         Room for the numbers of each lane as one line.
     deferred : (PAIR_LANES, 2, DEFERRED_COLUMNS) ndarray
@@ -147,43 +315,16 @@ def run_block(record, lanes, flags, grounds, pairs, deferred, rows, logs, cosine
         Rows of structures of the pairs at rest, then at the end; see `motion` for the columns. They
         hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), APPROACH
         (m/s) and IMPACTS, the lines of the log.
-    logs : (PAIR_LANES, n_lines, LOG_COLUMNS) ndarray
-        Receive one line per impact that may count, as long as there is room; see `contact` for
-        their columns.
-    cosine, sine : (PAIR_LANES,) ndarray
-        Of the azimuth of the axis from structure 1 to 2.
-    free_steps : (PAIR_LANES,) ndarray of int
-        Largest number of sampling intervals of free vibration for each pair, negative for a lane
-        without pair; it is overwritten.
+    kind : int
+        PAIRS or APART.
 
     Returns
     -------
     bool
         Whether all pairs reached the end: no step had too many events.
     """
-    prepare_block(lanes, pairs, rows, cosine, sine, free_steps, record.duration)
-    # the record, as far as any pair needs it
-    last = (record.components.shape[1] - 1) * record.refinement
-    group = 0
-    is_through = True
-    active = PAIR_LANES
-    while active and group < record.sizes.shape[1]:
-        step = group * GROUP_SAMPLES * record.refinement
-        group = min(group + GROUPS_BETWEEN_CHECKS, record.sizes.shape[1])
-        end = min(group * GROUP_SAMPLES * record.refinement, last)
-        is_through &= advance_block(
-            lanes, flags, pairs, rows, logs, deferred, record, grounds, step, end
-        )
-        active = retire_still_lanes(
-            lanes, pairs, rows, deferred, record, grounds, free_steps, group
-        )
-    # free vibration, until every pair is settled
-    elapsed = 0
-    while retire_lanes(lanes, pairs, rows, deferred, record, grounds, free_steps, elapsed):
-        step = last
-        last += SETTLING_STEPS * record.refinement
-        is_through &= advance_block(
-            lanes, flags, pairs, rows, logs, deferred, record, grounds, step, last
-        )
-        elapsed += SETTLING_STEPS
-    return is_through
+    # a line per structure
+    lines, waiting = rows.reshape(-1, rows.shape[2]), deferred.reshape(-1, deferred.shape[2])
+    memory = pairs.reshape(-1), lines, logs, waiting, np.empty((0, 0)), np.empty(0)
+    motion = FIRSTS_OF_PAIRS, cosine, sine, free_steps
+    return bool(run_lanes(kind, record, lanes, flags, grounds, memory, *motion))

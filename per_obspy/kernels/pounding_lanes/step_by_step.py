@@ -3,7 +3,8 @@ Scalar steps of one pair through a tile that may hold an event.
 
 Steps that certainly hold no event use the same formulas as ``lanes``; the others are repeated:
 single impacts by ``impact_steps``, yielding and unloading by ``stiffness_changes``, and all else
-from event to event, by the code of single histories (``next_event``).
+from event to event, by the code of single histories (``next_event``). Pairs that never touch have
+no impacts; an event is then a relative displacement that may pass its largest value.
 """
 
 import math
@@ -15,45 +16,41 @@ from per_obspy.kernels.pounding_events.motion import (
     GAP,
     IN_CONTACT,
     LARGEST_DISPLACEMENT,
-    LARGEST_RADIUS_SQUARED,
+    OPENING,
     TERM_COUNT,
     YIELD,
     Segment,
 )
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
-from per_obspy.kernels.pounding_lanes.deferred_maxima import (
-    raise_maxima_of_tile,
-    read_states,
-    search_deferred,
-    write_lane,
-)
 from per_obspy.kernels.pounding_lanes.impact_steps import run_free_impacts, set_states
 from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_FUNCTION,
     CONTACT_ROUNDING,
     DISPLACEMENT,
     DISPLACEMENT_ERROR,
-    EVENT_FLAG,
-    IS_CHANGED,
-    MAXIMUM_SO_FAR,
-    RADIUS_SQUARED_SO_FAR,
     START_DISPLACEMENT,
     START_VELOCITY,
     STRUCTURE_ROWS,
     VELOCITY,
     VELOCITY_ERROR,
-    at,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     complete_state,
     ground_along,
-    may_exceed_maxima,
     may_yield,
-    raise_maxima_inside,
+    raise_maxima,
     state_after_step,
 )
-from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, store_pair
+from per_obspy.kernels.pounding_lanes.phases import load_row, store_row
+from per_obspy.kernels.pounding_lanes.relative_in_step import (
+    may_exceed_relative,
+    raise_relative,
+    raise_relative_to,
+)
 from per_obspy.kernels.pounding_lanes.stiffness_changes import run_stiffness_changes
+
+#: Events of one step above which a history is given up: so many, and so many per bounce allowed.
+MOST_EVENTS, EVENTS_PER_BOUNCE = 1000, 100
 
 
 @inlined
@@ -87,8 +84,9 @@ def _contact_value(pair, left, right, ground):
 
 
 @inlined
-def _may_meet_or_part(pair, row, least, left, next_left, right, next_right):
+def _may_meet_or_part(pair, row, least, ends):
     """Return whether the contact function may fall through zero inside a step, by its least end."""
+    left, right, next_left, next_right = ends
     # error bound of the contact function: part of structure 1, then of structure 2
     margin = (
         abs(pair[CONTACT_FUNCTION]) * pair[DISPLACEMENT_ERROR]
@@ -103,10 +101,13 @@ def _may_meet_or_part(pair, row, least, left, next_left, right, next_right):
 
 
 @lean
-def run_events(row, log, segment, elapsed):
+def run_events(row, log, segment, elapsed, is_apart):
     """Carry a row through the rest of one step, event by event; return whether it got through."""
-    for _ in range(100 * int(row[0, BOUNCE_LIMIT])):
+    for _ in range(MOST_EVENTS + EVENTS_PER_BOUNCE * int(row[0, BOUNCE_LIMIT])):
+        # the piece until the next event
         span, kind, index = find_event(row, segment, elapsed)
+        if is_apart:
+            raise_relative(row, span, segment.terms)
         elapsed = elapsed + span if kind else segment.duration
         finish_piece(row, log, segment, elapsed, span, kind, index)
         if elapsed >= segment.duration:
@@ -115,14 +116,22 @@ def run_events(row, log, segment, elapsed):
 
 
 @lean
-def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, happens, yields):
-    """Carry a pair through a step that may hold an event; return whether it got through."""
-    # yielding and unloading of a free pair that does not meet
+def _repeat_step(pair, row, log, ends, segment, happens, yields, is_apart):
+    """
+    Carry a pair through a step that may hold an event; return whether it got through.
+
+    ``ends`` are the states of both structures at its start, then at its end without event.
+    """
+    left, right, next_left, next_right = ends
+    # yielding and unloading of a free pair that does not meet, or pass its largest distances
+    least, largest = -row[0, GAP], math.inf
+    if is_apart:
+        least, largest = -row[1, OPENING], row[0, OPENING]
     if (
         yields
         and not (happens or row[0, IN_CONTACT])
         and run_stiffness_changes(
-            pair, row, left, right, next_left, next_right, segment, -row[0, GAP], math.inf
+            pair, row, left, right, next_left, next_right, segment, least, largest
         )
     ):
         return True
@@ -130,26 +139,26 @@ def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, ha
     row[0, BOUNCES] = 0.0
     elapsed = -1.0
     # single impacts of a free pair
-    if not (yields or row[0, IN_CONTACT]):
+    if not (yields or is_apart or row[0, IN_CONTACT]):
         elapsed = run_free_impacts(pair, row, log, left, right, next_left, next_right, segment)
         if elapsed == segment.duration:
             return True
     # the rest event by event; the row has the state only after an impact
     if elapsed < 0.0:
-        load_pair(pair, row)
-    is_through = run_events(row, log, segment, max(elapsed, 0.0))
-    store_pair(pair, row, segment.duration)
+        load_row(pair, row)
+    is_through = run_events(row, log, segment, max(elapsed, 0.0), is_apart)
+    store_row(pair, row, segment.duration)
     return is_through
 
 
 @lean
-def step_through_tile(pair, row, log, ground, count, duration):
+def step_through_tile(pair, row, log, ground, count, duration, is_apart):
     """
     Carry a pair through a tile that may hold an event.
 
     Parameters
     ----------
-    pair : (LANE_ROWS,) ndarray
+    pair : (2 * STRUCTURE_ROWS,) ndarray
         Numbers of its lane; see `lanes` for its rows.
     row : (2, ROW_COLUMNS) ndarray
         Its row of structures; see `motion` for its columns.
@@ -161,6 +170,8 @@ def step_through_tile(pair, row, log, ground, count, duration):
         Number of steps of the tile.
     duration : float
         Of a step, s.
+    is_apart : bool
+        Whether the pair never touches, and its largest relative displacements are raised.
 
     Returns
     -------
@@ -171,80 +182,38 @@ def step_through_tile(pair, row, log, ground, count, duration):
     is_through = True
     is_bilinear = min(row[0, YIELD], row[1, YIELD]) < math.inf
     # states and contact function at the start of the tile
-    ground_start = ground_along(pair, ground, 0)
-    left = state_at_tile_start(pair, 0, ground_start)
-    right = state_at_tile_start(pair, second, ground_start)
-    least = _contact_value(pair, left, right, ground_start)
+    before = ground_along(pair, ground, 0)
+    left = state_at_tile_start(pair, 0, before)
+    right = state_at_tile_start(pair, second, before)
+    least = _contact_value(pair, left, right, before)
     for k in range(1, count + 1):
         # states after the step, as if no event happened in it
-        ground_end = ground_along(pair, ground, k)
-        next_left = state_after_step(pair, 0, left, ground_start, ground_end)
-        next_right = state_after_step(pair, second, right, ground_start, ground_end)
-        next_least = _contact_value(pair, next_left, next_right, ground_end)
+        after = ground_along(pair, ground, k)
+        next_left = state_after_step(pair, 0, left, before, after)
+        next_right = state_after_step(pair, second, right, before, after)
+        next_least = _contact_value(pair, next_left, next_right, after)
+        ends = left, right, next_left, next_right
         # events that the error bounds do not exclude
-        happens = _may_meet_or_part(
-            pair, row, min(least, next_least), left, next_left, right, next_right
-        )
+        if is_apart:
+            happens = may_exceed_relative(pair, row, left, right, next_left, next_right)
+        else:
+            happens = _may_meet_or_part(pair, row, min(least, next_least), ends)
         yields = is_bilinear and (
             may_yield(pair, 0, left, next_left) or may_yield(pair, second, right, next_right)
         )
         if happens | yields:
             # repeat the step with its events
-            segment = segment_of_step(row, ground_start, ground_end, duration)
-            is_through &= _repeat_step(
-                pair, row, log, left, right, next_left, next_right, segment, happens, yields
-            )
-            next_left = present_state(pair, 0, ground_end)
-            next_right = present_state(pair, second, ground_end)
-            next_least = _contact_value(pair, next_left, next_right, ground_end)
+            segment = segment_of_step(row, before, after, duration)
+            is_through &= _repeat_step(pair, row, log, ends, segment, happens, yields, is_apart)
+            next_left = present_state(pair, 0, after)
+            next_right = present_state(pair, second, after)
+            next_least = _contact_value(pair, next_left, next_right, after)
         else:
             # maxima inside the step
-            change = ground_end - ground_start
-            if may_exceed_maxima(pair, row, 0, left, next_left):
-                raise_maxima_inside(pair, row, 0, left, next_left, change, 1.0)
-            if may_exceed_maxima(pair, row, 1, right, next_right):
-                raise_maxima_inside(pair, row, 1, right, next_right, change, 1.0)
-        left = next_left
-        right = next_right
-        least = next_least
-        ground_start = ground_end
+            raise_maxima(pair, row, 0, left, next_left, after - before, 1.0)
+            raise_maxima(pair, row, 1, right, next_right, after - before, 1.0)
+        left, right, least, before = next_left, next_right, next_least, after
     set_states(pair, left, right)
-    return is_through
-
-
-@lean
-def write_back(lanes, lane, pair, row):
-    """Copy a pair back to its lane, with the maxima of its row, and coefficients that are new."""
-    if pair[IS_CHANGED] != 0.0:
-        pair[IS_CHANGED] = 0.0
-        write_lane(lanes, lane, pair)
-    # state and maxima
-    for i in range(2):
-        first = i * STRUCTURE_ROWS
-        lanes[at(first + DISPLACEMENT, lane)] = pair[first + DISPLACEMENT]
-        lanes[at(first + VELOCITY, lane)] = pair[first + VELOCITY]
-        lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
-        lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
-
-
-@lean
-def treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count):
-    """
-    Treat one flagged lane after the sweep of a tile; return whether it got through.
-
-    ``memory`` is that of the lane: its line of numbers, its row, the log and its deferred
-    tiles; ``grounds`` is the ground of this tile and room for that of a deferred one.
-    """
-    pair, row, log, deferred = memory
-    # a maximum only
-    if not flag & EVENT_FLAG:
-        raise_maxima_of_tile(
-            lanes, lane, flag, pair, row, deferred, record, grounds[1], step, count
-        )
-        return True
-    # an event: earlier maxima first, then the tile again from its start
-    search_deferred(lanes, lane, pair, row, deferred, record, grounds[1])
-    read_states(lanes, lane, pair)
-    is_through = step_through_tile(pair, row, log, grounds[0], count, record.duration)
-    write_back(lanes, lane, pair, row)
+    if is_apart:
+        raise_relative_to(row, right[0] - left[0])
     return is_through

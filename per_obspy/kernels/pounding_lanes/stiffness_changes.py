@@ -30,11 +30,10 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     YIELD_SIDE,
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
-    may_exceed_maxima,
     may_yield,
-    raise_maxima_inside,
+    raise_maxima,
 )
-from per_obspy.kernels.pounding_lanes.pair_rows import write_branch
+from per_obspy.kernels.pounding_lanes.phases import write_branch
 
 #: Predictions for a structure in a piece of a step: the last two change its stiffness.
 UNCERTAIN, STAYS, CHANGES_ONCE, CHANGES_NOW = 0, 1, 2, 3
@@ -299,8 +298,7 @@ def run_changes(pair, row, i, start, end, segment):
         if prediction == UNCERTAIN or share < 0.0:
             break
         # its maxima and bounds
-        if may_exceed_maxima(pair, row, i, start, after):
-            raise_maxima_inside(pair, row, i, start, after, change, share)
+        raise_maxima(pair, row, i, start, after, change, share)
         low = min(low, after[0])
         high = max(high, after[0])
         strength = max(abs(start[2]), abs(after[2]))

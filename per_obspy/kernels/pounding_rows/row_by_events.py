@@ -33,7 +33,7 @@ def _advance_interval(row, log, time, start, slope, refinement, duration, terms)
         shift = part * duration
         row[0, BOUNCES] = 0.0
         segment = Segment(time + shift, duration, start + slope * shift, slope, terms)
-        is_through &= run_events(row, log, segment, 0.0)
+        is_through &= run_events(row, log, segment, 0.0, False)
     return is_through
 
 

@@ -42,16 +42,14 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_FUNCTION,
     CONTACT_ROUNDING,
     DISPLACEMENT_ERROR,
+    LARGEST_RATE,
     OMEGA,
+    STRUCTURE_ROWS,
     VELOCITY_ERROR,
 )
-from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, may_yield
-from per_obspy.kernels.pounding_rows.member_phases import LARGEST_RATE, update_phases, write_steps
-from per_obspy.kernels.pounding_rows.pieces import (
-    END,
-    raise_maximum,
-    set_state,
-)
+from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, may_yield, raise_maxima
+from per_obspy.kernels.pounding_lanes.phases import update_phases, write_steps
+from per_obspy.kernels.pounding_rows.pieces import END, set_state
 from per_obspy.kernels.pounding_rows.window_lanes import (
     BEFORE,
     CLEARANCE,
@@ -84,31 +82,36 @@ def _now(window, i):
 
 
 @inlined
-def _later(member, window, i, share, ground):
+def _later(members, window, i, share, ground):
     """Return the state of a building after a share of the step, under a ground acceleration."""
     u = rate = 0.0
     for n in range(WINDOW_TERMS - 1, -1, -1):
         rate = rate * share + u
         u = u * share + window[at(POLYNOMIAL + n, i)]
-    return complete_state(member, 0, u, rate * window[at(PER_ANGLE, i)], ground)
+    return complete_state(members, i * STRUCTURE_ROWS, u, rate * window[at(PER_ANGLE, i)], ground)
 
 
 @inlined
-def _contact_force(member, value, ground):
+def _contact_force(members, own, value, ground):
     """Return the contact function of a closed interface, from the state of its left building."""
-    form = member[CONTACT_FUNCTION + 3] * ground + member[CONTACT_FUNCTION + 4]
-    return (member[CONTACT_FUNCTION] * value[0] + member[CONTACT_FUNCTION + 2] * value[1]) + form
+    form = members[own + CONTACT_FUNCTION + 3] * ground + members[own + CONTACT_FUNCTION + 4]
+    by_velocity = members[own + CONTACT_FUNCTION + 2] * value[1]
+    return members[own + CONTACT_FUNCTION] * value[0] + by_velocity + form
 
 
 @inlined
-def _may_part(member, row, i, start, end, grounds, share):
+def _may_part(members, row, i, start, end, grounds, share):
     """Return whether a closed interface may open in a window of this share of the step."""
-    least = min(_contact_force(member, start, grounds[0]), _contact_force(member, end, grounds[1]))
+    own = i * STRUCTURE_ROWS
+    least = min(
+        _contact_force(members, own, start, grounds[0]),
+        _contact_force(members, own, end, grounds[1]),
+    )
     # what the states leave their chords by
-    error = share * abs(member[CONTACT_FUNCTION]) * member[DISPLACEMENT_ERROR]
-    error += abs(member[CONTACT_FUNCTION + 2]) * member[VELOCITY_ERROR]
+    error = share * abs(members[own + CONTACT_FUNCTION]) * members[own + DISPLACEMENT_ERROR]
+    error += abs(members[own + CONTACT_FUNCTION + 2]) * members[own + VELOCITY_ERROR]
     margin = share * error * max(abs(start[2]), abs(end[2]))
-    return least - margin < -member[CONTACT_ROUNDING] * row[i, LARGEST_DISPLACEMENT]
+    return least - margin < -members[own + CONTACT_ROUNDING] * row[i, LARGEST_DISPLACEMENT]
 
 
 @lean
@@ -119,10 +122,10 @@ def _may_hold_other_event(members, row, window, grounds, share):
         if may_change or row[i, IN_CONTACT]:
             # states at both ends of the window
             start = _now(window, i)
-            end = _later(members[i], window, i, share, grounds[1])
-            if may_change and may_yield(members[i], 0, start, end):
+            end = _later(members, window, i, share, grounds[1])
+            if may_change and may_yield(members, i * STRUCTURE_ROWS, start, end):
                 return True
-            if row[i, IN_CONTACT] and _may_part(members[i], row, i, start, end, grounds, share):
+            if row[i, IN_CONTACT] and _may_part(members, row, i, start, end, grounds, share):
                 return True
     return False
 
@@ -181,7 +184,7 @@ def _move(members, row, window, share, ground, change):
         # maxima on the way
         if window[at(MAY_EXCEED, i)]:
             start = _before(window, i)
-            raise_maximum(members[i], row, i, start, _now(window, i), change, share)
+            raise_maxima(members, row, i, start, _now(window, i), change, share)
             window[at(LARGEST, i)] = row[i, LARGEST_DISPLACEMENT]
 
 
@@ -195,7 +198,7 @@ def _pass_window(members, row, window, segment, elapsed):
     """
     # polynomials of the window
     change = segment.slope * segment.duration
-    end = min(elapsed + WINDOW_REACH / members[0, LARGEST_RATE], 1.0)
+    end = min(elapsed + WINDOW_REACH / members[LARGEST_RATE], 1.0)
     room = end - elapsed
     grounds = segment.acceleration + elapsed * change, segment.acceleration + end * change
     for first in range(0, row.shape[0], WIDTH):
@@ -216,7 +219,7 @@ def _write_row(members, row, window, first, last):
     """Copy the states of some buildings from their lanes to the row."""
     for i in range(max(first, 0), min(last + 1, row.shape[0])):
         row[i, U] = window[at(NOW, i)]
-        row[i, V] = window[at(NOW + 1, i)] * members[i, OMEGA]
+        row[i, V] = window[at(NOW + 1, i)] * members[i * STRUCTURE_ROWS + OMEGA]
 
 
 @lean
@@ -242,7 +245,7 @@ def _read_states(members, row, window):
     """Copy the states of the row, and which interfaces have just met, to its lanes."""
     for i in range(row.shape[0]):
         window[at(NOW, i)] = row[i, U]
-        window[at(NOW + 1, i)] = row[i, V] / members[i, OMEGA]
+        window[at(NOW + 1, i)] = row[i, V] / members[i * STRUCTURE_ROWS + OMEGA]
         # what changes at events only
         window[at(MET, i)] = row[i, CLEARANCE_ORDER]
         window[at(LARGEST, i)] = row[i, LARGEST_DISPLACEMENT]
@@ -305,7 +308,7 @@ def _pass_impact(members, row, log, window, hit, elapsed, segment):
     row[hit, CLEARANCE_ORDER] = 1.0
     window[at(MET, hit)] = 1.0
     for i in (hit, hit + 1):
-        window[at(NOW + 1, i)] = row[i, V] / members[i, OMEGA]
+        window[at(NOW + 1, i)] = row[i, V] / members[i * STRUCTURE_ROWS + OMEGA]
     return True
 
 
@@ -313,8 +316,8 @@ def _pass_impact(members, row, log, window, hit, elapsed, segment):
 def _write_ends(members, row, states, ground):
     """Write the states at the end of the step."""
     for i in range(row.shape[0]):
-        z = row[i, V] / members[i, OMEGA]
-        set_state(states, i, END, complete_state(members[i], 0, row[i, U], z, ground))
+        z = row[i, V] / members[i * STRUCTURE_ROWS + OMEGA]
+        set_state(states, i, END, complete_state(members, i * STRUCTURE_ROWS, row[i, U], z, ground))
 
 
 @lean
@@ -324,8 +327,8 @@ def run_row_impacts(members, row, log, states, window, segment):
 
     Parameters
     ----------
-    members : (n_buildings, LANE_ROWS) ndarray
-        Numbers of its lanes; see `lanes` for the columns.
+    members : (n_buildings * STRUCTURE_ROWS,) ndarray
+        Numbers of its lanes; see `lanes` for the rows.
     row : (n_buildings, ROW_COLUMNS) ndarray
         Its lines at the start of the step, then at its end; see `motion` for the columns.
     log : (n_lines, LOG_COLUMNS) ndarray

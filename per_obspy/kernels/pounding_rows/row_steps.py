@@ -1,7 +1,7 @@
 """
 Scalar steps of one row through a tile that may hold an event.
 
-Steps that certainly hold no event use the same formulas as ``building_lanes``; the others go from
+Steps that certainly hold no event use the same formulas as ``lanes``; the others go from
 event to event, by the code of single histories (``next_event``).
 """
 
@@ -22,6 +22,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT_ERROR,
     START_DISPLACEMENT,
     START_VELOCITY,
+    STRUCTURE_ROWS,
     VELOCITY,
     VELOCITY_ERROR,
 )
@@ -29,11 +30,12 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     complete_state,
     ground_along,
     may_yield,
+    raise_maxima,
     state_after_step,
 )
+from per_obspy.kernels.pounding_lanes.phases import load_row
 from per_obspy.kernels.pounding_lanes.step_by_step import segment_of_step
-from per_obspy.kernels.pounding_rows.member_phases import load_row
-from per_obspy.kernels.pounding_rows.pieces import END, START, raise_maximum, set_state, state
+from per_obspy.kernels.pounding_rows.pieces import END, START, set_state, state
 from per_obspy.kernels.pounding_rows.row_impacts import run_row_impacts
 
 
@@ -41,17 +43,19 @@ from per_obspy.kernels.pounding_rows.row_impacts import run_row_impacts
 def _contact_value(members, states, j, column, ground):
     """Return the contact function of interface j: positive until its buildings meet or part."""
     # part of the velocity and the ground, then both displacements
-    form = members[j, CONTACT_FUNCTION + 2] * states[j, column + 1] + (
-        members[j, CONTACT_FUNCTION + 3] * ground + members[j, CONTACT_FUNCTION + 4]
+    own = j * STRUCTURE_ROWS
+    form = members[own + CONTACT_FUNCTION + 2] * states[j, column + 1] + (
+        members[own + CONTACT_FUNCTION + 3] * ground + members[own + CONTACT_FUNCTION + 4]
     )
-    return members[j, CONTACT_FUNCTION] * states[j, column] + (
-        members[j, CONTACT_FUNCTION + 1] * states[j + 1, column] + form
+    return members[own + CONTACT_FUNCTION] * states[j, column] + (
+        members[own + CONTACT_FUNCTION + 1] * states[j + 1, column] + form
     )
 
 
 @lean
 def _may_meet_or_part(members, row, states, j, ground_start, ground_end):
     """Return whether the contact function of an interface may fall through zero in a piece."""
+    own = j * STRUCTURE_ROWS
     # least value at the ends of the piece
     least = min(
         _contact_value(members, states, j, START, ground_start),
@@ -59,13 +63,16 @@ def _may_meet_or_part(members, row, states, j, ground_start, ground_end):
     )
     # error bound of the contact function: part of the left building, then of the right one
     margin = (
-        abs(members[j, CONTACT_FUNCTION]) * members[j, DISPLACEMENT_ERROR]
-        + abs(members[j, CONTACT_FUNCTION + 2]) * members[j, VELOCITY_ERROR]
+        abs(members[own + CONTACT_FUNCTION]) * members[own + DISPLACEMENT_ERROR]
+        + abs(members[own + CONTACT_FUNCTION + 2]) * members[own + VELOCITY_ERROR]
     )
     margin *= max(abs(states[j, START + 2]), abs(states[j, END + 2]))
-    other = abs(members[j, CONTACT_FUNCTION + 1]) * members[j + 1, DISPLACEMENT_ERROR]
+    other = (
+        abs(members[own + CONTACT_FUNCTION + 1])
+        * members[own + STRUCTURE_ROWS + DISPLACEMENT_ERROR]
+    )
     margin += other * max(abs(states[j + 1, START + 2]), abs(states[j + 1, END + 2]))
-    return least - margin < -members[j, CONTACT_ROUNDING] * row[j, LARGEST_DISPLACEMENT]
+    return least - margin < -members[own + CONTACT_ROUNDING] * row[j, LARGEST_DISPLACEMENT]
 
 
 @lean
@@ -73,7 +80,7 @@ def _may_yield_in_step(members, row, states):
     """Return whether a building may yield or unload in a piece."""
     for i in range(row.shape[0]):
         if row[i, YIELD] < math.inf and may_yield(
-            members[i], 0, state(states, i, START), state(states, i, END)
+            members, i * STRUCTURE_ROWS, state(states, i, START), state(states, i, END)
         ):
             return True
     return False
@@ -87,7 +94,7 @@ def _is_open_in_step(members, row, states, j, duration):
     next_left = state(states, j, END)
     next_right = state(states, j + 1, END)
     return row[j, IN_CONTACT] == 0.0 and stays_open(
-        members[j], left, right, next_left, next_right, 1.0, duration, False
+        members[j * STRUCTURE_ROWS :], left, right, next_left, next_right, 1.0, duration, False
     )
 
 
@@ -107,8 +114,8 @@ def _may_hold_event(members, row, states, before, after, duration):
 def set_members(members, row, states, column):
     """Set displacement and velocity of the members to those of their states."""
     for i in range(row.shape[0]):
-        members[i, DISPLACEMENT] = states[i, column]
-        members[i, VELOCITY] = states[i, column + 1]
+        members[i * STRUCTURE_ROWS + DISPLACEMENT] = states[i, column]
+        members[i * STRUCTURE_ROWS + VELOCITY] = states[i, column + 1]
 
 
 @lean
@@ -118,8 +125,8 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
 
     Parameters
     ----------
-    members : (n_buildings, LANE_ROWS) ndarray
-        Numbers of its lanes; see `lanes` for the columns.
+    members : (n_buildings * STRUCTURE_ROWS,) ndarray
+        Numbers of its lanes; see `lanes` for the rows.
     row : (n_buildings, ROW_COLUMNS) ndarray
         Its lines; see `motion` for the columns.
     log : (n_lines, LOG_COLUMNS) ndarray
@@ -142,17 +149,19 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
     """
     is_through = True
     # states at the start of the tile
-    before = ground_along(members[0], ground, 0)
+    before = ground_along(members, ground, 0)
     for i in range(row.shape[0]):
-        u = members[i, START_DISPLACEMENT]
-        z = members[i, START_VELOCITY]
-        set_state(states, i, START, complete_state(members[i], 0, u, z, before))
+        own = i * STRUCTURE_ROWS
+        u = members[own + START_DISPLACEMENT]
+        z = members[own + START_VELOCITY]
+        set_state(states, i, START, complete_state(members, own, u, z, before))
     for k in range(1, count + 1):
         # states after the step, as if no event happened in it
-        after = ground_along(members[0], ground, k)
+        after = ground_along(members, ground, k)
         for i in range(row.shape[0]):
             start = state(states, i, START)
-            set_state(states, i, END, state_after_step(members[i], 0, start, before, after))
+            own = i * STRUCTURE_ROWS
+            set_state(states, i, END, state_after_step(members, own, start, before, after))
         if _may_hold_event(members, row, states, before, after, duration):
             # the step again, from event to event
             set_members(members, row, states, START)
@@ -162,8 +171,8 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
             is_through &= run_row_impacts(members, row, log, states, window, segment)
         else:
             for i in range(row.shape[0]):
-                ends = state(states, i, START), state(states, i, END)
-                raise_maximum(members[i], row, i, ends[0], ends[1], after - before, 1.0)
+                start, end = state(states, i, START), state(states, i, END)
+                raise_maxima(members, row, i, start, end, after - before, 1.0)
         # on to the next step
         for i in range(row.shape[0]):
             set_state(states, i, START, state(states, i, END))

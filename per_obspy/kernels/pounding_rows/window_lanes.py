@@ -21,6 +21,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     ANGLE,
     PAIR_LANES,
     POWER_ERROR,
+    STRUCTURE_ROWS,
 )
 
 #: Lanes of one loop.
@@ -235,10 +236,11 @@ def load_buildings(members, row, window):
     """Copy what does not change inside a window: equations, gaps and maxima."""
     for i in range(row.shape[0]):
         # equation of motion
+        own = i * STRUCTURE_ROWS
         for k in range(4):
-            window[at(BY_STATE + k, i)] = members[i, ACCELERATION + k]
-        window[at(STEP_ANGLE, i)] = members[i, ANGLE]
-        window[at(PER_ANGLE, i)] = 1.0 / members[i, ANGLE]
-        window[at(ERROR, i)] = members[i, POWER_ERROR]
+            window[at(BY_STATE + k, i)] = members[own + ACCELERATION + k]
+        window[at(STEP_ANGLE, i)] = members[own + ANGLE]
+        window[at(PER_ANGLE, i)] = 1.0 / members[own + ANGLE]
+        window[at(ERROR, i)] = members[own + POWER_ERROR]
         window[at(LARGEST, i)] = row[i, LARGEST_DISPLACEMENT]
         window[at(CLEAR, i)] = row[i, GAP]

@@ -17,7 +17,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
 from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course, stays_open
 from per_obspy.kernels.pounding_lanes.lanes import CONTACT_FUNCTION, LANE_ROWS
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state
-from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.phases import write_constants
 
 STEP, COUNT = 0.02, 500
 #: Times at which the motion inside a piece is looked at, as shares of the piece.
@@ -39,7 +39,6 @@ def pair_of(random):
     row[:, columns.PARTICIPATION] = row[:, columns.MASS] = 1.0
     row[0, columns.GAP] = random.choice([0.0, 0.01])
     write_constants(pair, row, 1.0, 0.0, STEP)
-    write_phase(pair, row, STEP)
     return pair, row, omega
 
 

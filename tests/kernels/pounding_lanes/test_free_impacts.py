@@ -13,7 +13,7 @@ from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, count_impacts
 from per_obspy.kernels.pounding_lanes import free_impacts, impact_steps, lanes
 from per_obspy.kernels.pounding_lanes.impact_steps import clearance_course
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
-from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.phases import load_row, write_constants
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
@@ -33,7 +33,6 @@ def resting_pair(period_1=0.3, period_2=0.2, damping=0.3, restitution=0.6):
     row[0, columns.BOUNCE_LIMIT] = 25
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, DURATION)
-    write_phase(pair, row, DURATION)
     return pair, row
 
 
@@ -187,7 +186,7 @@ def test_bounces_end_as_in_the_event_code():
             row[0, columns.BOUNCES] = count
             row[0, columns.STICKING_SPEED], row[0, columns.STICKING_DELAY] = speed, delay
             impact_steps.set_states(pair, left, right)
-            load_pair(pair, row)
+            load_row(pair, row)
             expected = is_lingering(row, 0, ground)
             assert impact_steps._bounces_end(pair, row, left, right) == expected
             ends.append(expected)
@@ -273,12 +272,12 @@ def test_agrees_with_the_event_code(restitution):
         fast, expected = row.copy(), row.copy()
         fast_log, log = np.zeros((2, LINES, LOG_COLUMNS))
         impact_steps.set_states(pair, *states[:2])
-        load_pair(pair, expected)
-        assert run_events(expected, log, segment, 0.0)
+        load_row(pair, expected)
+        assert run_events(expected, log, segment, 0.0, False)
         # by single impacts, where these carry through the step
         if impact_steps.run_free_impacts(pair, fast, fast_log, *states, segment) < DURATION:
             continue
-        load_pair(pair, fast)
+        load_row(pair, fast)
         assert fast[0, columns.BOUNCES] == expected[0, columns.BOUNCES]
         # those that never count have no line of the log
         numbers = count_impacts(np.stack([fast, expected]), np.stack([fast_log, log]))

@@ -13,7 +13,7 @@ from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.deferred_maxima import write_lane
 from per_obspy.kernels.pounding_lanes.lanes import sweep_tile
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
-from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.phases import rest_row, write_constants
 from per_obspy.pounding.kernel_tables import pair_table, row_at_rest
 from per_obspy.pounding.structure import Pairs
 
@@ -34,7 +34,6 @@ def lane_of(fields, duration, yielding=0.0):
     # along the north component
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, duration)
-    write_phase(pair, row, duration)
     return pair
 
 
@@ -42,6 +41,12 @@ def empty_lanes():
     """Return room for the numbers of all lanes and for their flags."""
     numbers = np.zeros(lanes.LANE_ROWS * lanes.PAIR_LANES)
     return numbers, np.zeros(lanes.PAIR_LANES, np.int64)
+
+
+def write_pair(table, lane, pair):
+    """Write the numbers of a pair to its lane."""
+    for i in range(2):
+        write_lane(table, lane + i * lanes.BANK, pair, i * lanes.STRUCTURE_ROWS)
 
 
 class TestFlags:
@@ -55,8 +60,8 @@ class TestFlags:
             # no maximum is looked for
             pair[lanes.MAXIMUM_SO_FAR] = pair[lanes.RADIUS_SQUARED_SO_FAR] = math.inf
             pair[lanes.STRUCTURE_ROWS + lanes.MAXIMUM_SO_FAR] = math.inf
-            write_lane(table, lane, pair)
-        sweep_tile(table, flags, np.zeros((2, lanes.TILE_STEPS + 1)), lanes.TILE_STEPS)
+            write_pair(table, lane, pair)
+        sweep_tile(lanes.PAIRS, table, flags, np.zeros((2, lanes.TILE_STEPS + 1)), lanes.TILE_STEPS)
         return flags
 
     def test_a_lane_that_meets_within_the_tile(self):
@@ -79,8 +84,8 @@ class TestFlags:
         pair[lanes.STRUCTURE_ROWS + lanes.DISPLACEMENT] = -0.02  # beyond its maximum, 0
         table, flags = empty_lanes()
         for lane in range(lanes.PAIR_LANES):
-            write_lane(table, lane, pair)
-        sweep_tile(table, flags, np.zeros((2, lanes.TILE_STEPS + 1)), lanes.TILE_STEPS)
+            write_pair(table, lane, pair)
+        sweep_tile(lanes.PAIRS, table, flags, np.zeros((2, lanes.TILE_STEPS + 1)), lanes.TILE_STEPS)
         assert_array_equal(flags, lanes.PEAK_FLAGS[1])
 
 
@@ -92,25 +97,29 @@ def test_four_steps_at_once_are_four_steps():
     once, _ = empty_lanes()
     for lane in range(lanes.PAIR_LANES):
         pair[[lanes.DISPLACEMENT, lanes.VELOCITY]] = random.normal(size=2)
-        pair[[lanes.AXIS_COSINE, lanes.AXIS_SINE]] = math.cos(lane), math.sin(lane)
-        write_lane(once, lane, pair)
-    lanes.start_tile(once, *ground[:, 0])
+        for first in (0, lanes.STRUCTURE_ROWS):
+            pair[first + lanes.AXIS_COSINE] = math.cos(lane)
+            pair[first + lanes.AXIS_SINE] = math.sin(lane)
+        write_pair(once, lane, pair)
+    lanes.start_structures(once, lanes.PAIRS)
+    lanes.lower_contacts(once, lanes.PAIRS, *ground[:, 0], True)
     each = once.copy()
-    lanes.advance_four_steps(once, *ground.T.ravel())
+    lanes.advance_pairs(once, *ground.T.ravel())
     for k in range(4):
-        lanes.advance_one_step(each, *ground[:, k], *ground[:, k + 1])
+        lanes.advance_one_step(each, lanes.PAIRS, *ground[:, k], *ground[:, k + 1])
+        lanes.lower_contacts(each, lanes.PAIRS, *ground[:, k + 1], False)
     np.testing.assert_allclose(once, each, rtol=1e-14, atol=1e-16)  # rounding
 
 
 def test_a_resting_lane_is_never_flagged():
     pair = lane_of({**LINEAR, "gap": 0.0, "yield_displacement_2": 1e-6}, 0.01)
-    rest_pair(pair)
+    rest_row(pair, 2)
     # under strong ground motion
     table, flags = empty_lanes()
     for lane in range(lanes.PAIR_LANES):
-        write_lane(table, lane, pair)
+        write_pair(table, lane, pair)
     ground = 100.0 * np.random.default_rng(0).normal(size=(2, lanes.TILE_STEPS + 1))
-    assert sweep_tile(table, flags, ground, lanes.TILE_STEPS) == 0
+    assert sweep_tile(lanes.PAIRS, table, flags, ground, lanes.TILE_STEPS) == 0
 
 
 class TestYieldingLanes:
@@ -128,8 +137,8 @@ class TestYieldingLanes:
         for lane in range(lanes.PAIR_LANES):
             pair[first + lanes.DISPLACEMENT] = self.SIDE * 0.01
             pair[first + lanes.VELOCITY] = self.SIDE * speeds[lane]
-            write_lane(table, lane, pair)
-        sweep_tile(table, flags, ground, lanes.TILE_STEPS)
+            write_pair(table, lane, pair)
+        sweep_tile(lanes.PAIRS, table, flags, ground, lanes.TILE_STEPS)
         return flags, pair
 
     def least_speed(self, pair, first, speed, ground):
@@ -182,11 +191,11 @@ class TestYieldingLanes:
     def test_a_resting_lane_has_no_flag(self):
         # catches: a lane without pair that is flagged for its velocity, which is zero
         pair = lane_of({**LINEAR, "yield_displacement_1": 0.01}, self.DURATION, yielding=self.SIDE)
-        rest_pair(pair)
+        rest_row(pair, 2)
         table, flags = empty_lanes()
         for lane in range(lanes.PAIR_LANES):
-            write_lane(table, lane, pair)
-        assert sweep_tile(table, flags, np.ones((2, lanes.TILE_STEPS + 1)), 5) == 0
+            write_pair(table, lane, pair)
+        assert sweep_tile(lanes.PAIRS, table, flags, np.ones((2, lanes.TILE_STEPS + 1)), 5) == 0
 
 
 def lane_of_parts(pair, first):

@@ -18,11 +18,10 @@ from per_obspy.kernels.pounding_events.motion import (
 )
 from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
-from per_obspy.kernels.pounding_lanes.pair_rows import (
-    load_pair,
-    store_pair,
+from per_obspy.kernels.pounding_lanes.phases import (
+    load_row,
+    store_row,
     write_constants,
-    write_phase,
 )
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
@@ -46,8 +45,7 @@ def pair_of(structures, gap=0.01, **changes):
     # along the north component
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, DURATION)
-    write_phase(pair, row, DURATION)
-    store_pair(pair, row, DURATION)
+    store_row(pair, row, DURATION)
     return pair, row
 
 
@@ -97,11 +95,11 @@ class TestPhases:
         pair, row = pair_of(STRUCTURES, columns=PHASES[phase])
         expected, other = row[:, [motion.U, motion.V, motion.PLASTIC]].copy(), pair.copy()
         row[:, [motion.U, motion.V]] = 0.0
-        load_pair(pair, row)
+        load_row(pair, row)
         if phase == "yielding":  # then the plastic displacement follows
             expected[:, 2] = expected[:, 0] - row[:, motion.PHASE] * row[:, motion.YIELD]
         assert_allclose(row[:, [motion.U, motion.V, motion.PLASTIC]], expected, rtol=1e-15)
-        store_pair(other, row, DURATION)
+        store_row(other, row, DURATION)
         assert_allclose(other, pair, rtol=1e-15)  # rounding of a division and a product
 
 
@@ -109,7 +107,7 @@ def test_a_new_phase_has_new_coefficients():
     # catches: a lane that goes on with the coefficients of the phase before
     pair, row = pair_of(STRUCTURES)
     row[0, motion.PHASE] = 1.0
-    store_pair(pair, row, DURATION)
+    store_row(pair, row, DURATION)
     fresh, _ = pair_of(STRUCTURES, columns={motion.PHASE: (1.0, 0.0)})
     assert_allclose(pair, fresh, rtol=1e-15)
 

@@ -9,14 +9,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.kernels.pounding_events import motion
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, count_impacts
 from per_obspy.kernels.pounding_lanes import lanes
-from per_obspy.kernels.pounding_lanes.deferred_maxima import read_lane, write_lane
+from per_obspy.kernels.pounding_lanes.deferred_maxima import write_back
 from per_obspy.kernels.pounding_lanes.maxima_in_step import ground_along
-from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.phases import (
+    load_row,
+    update_phases,
+    write_constants,
+    write_steps,
+)
 from per_obspy.kernels.pounding_lanes.step_by_step import (
     run_events,
     segment_of_step,
     step_through_tile,
-    write_back,
 )
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
@@ -36,7 +40,6 @@ def pair_at_rest(gap, limit, restitution):
     row[0, motion.BOUNCE_LIMIT] = 25
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 0.6, 0.8, DURATION)
-    write_phase(pair, row, DURATION)
     return pair, row
 
 
@@ -46,7 +49,7 @@ def single_history(pair, row, ground):
     for k in range(lanes.TILE_STEPS):
         start, end = ground_along(pair, ground, k), ground_along(pair, ground, k + 1)
         after[0, motion.BOUNCES] = 0.0
-        assert run_events(after, log, segment_of_step(after, start, end, DURATION), 0.0)
+        assert run_events(after, log, segment_of_step(after, start, end, DURATION), 0.0, False)
     return after, log
 
 
@@ -69,8 +72,8 @@ def test_agrees_with_the_event_code(gap, limit, restitution, meets):
     pair, row = pair_at_rest(gap, limit, restitution)
     expected, expected_log = single_history(pair, row, ground)
     log = np.zeros((LINES, LOG_COLUMNS))
-    assert step_through_tile(pair, row, log, ground, lanes.TILE_STEPS, DURATION)
-    load_pair(pair, row)
+    assert step_through_tile(pair, row, log, ground, lanes.TILE_STEPS, DURATION, False)
+    load_row(pair, row)
     # impacts that count; others may have no line of the log
     counts = count_impacts(np.stack([row, expected]), np.stack([log, expected_log]))
     assert counts[0] == counts[1]
@@ -90,13 +93,14 @@ def test_agrees_with_the_event_code(gap, limit, restitution, meets):
 def test_coefficients_of_a_new_phase_are_written_back():
     # catches: coefficients that stay in the line of the pair, states or maxima that do
     pair, row = pair_at_rest(0.002, math.inf, 0.6)
-    table, again = np.zeros(lanes.LANE_ROWS * lanes.PAIR_LANES), np.zeros(lanes.LANE_ROWS)
-    write_lane(table, 3, pair)
+    table = np.zeros(lanes.LANE_ROWS * lanes.PAIR_LANES)
     pair[lanes.DISPLACEMENT], row[1, motion.LARGEST_DISPLACEMENT] = 0.1, 0.2
     row[0, motion.IN_CONTACT] = 1.0
-    write_phase(pair, row, DURATION)
-    write_back(table, 3, pair, row)
-    read_lane(table, 3, again)
+    update_phases(pair, row)
+    write_steps(pair, row, DURATION)
+    for i in range(2):
+        write_back(table, 3 + i * lanes.BANK, pair, row, i)
+    again = table[3 :: lanes.PAIR_LANES]
     second = lanes.STRUCTURE_ROWS
     for rows in (
         slice(lanes.STEP_DISPLACEMENT, lanes.ACCELERATION + 4),
@@ -106,4 +110,4 @@ def test_coefficients_of_a_new_phase_are_written_back():
         assert_array_equal(again[rows], pair[rows])
     assert again[lanes.DISPLACEMENT] == 0.1
     assert again[second + lanes.MAXIMUM_SO_FAR] == 0.2
-    assert pair[lanes.IS_CHANGED] == 0.0
+    assert pair[lanes.IS_CHANGED] == pair[second + lanes.IS_CHANGED] == 0.0

@@ -16,11 +16,10 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     may_yield,
     state_after_step,
 )
-from per_obspy.kernels.pounding_lanes.pair_rows import (
-    load_pair,
+from per_obspy.kernels.pounding_lanes.phases import (
+    load_row,
     write_branch,
     write_constants,
-    write_phase,
 )
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
@@ -42,7 +41,6 @@ def resting_pair(gap=1.0, hardening=0.1, damping=0.3):
     row[0, columns.BOUNCE_LIMIT] = 25
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, DURATION)
-    write_phase(pair, row, DURATION)
     return pair, row
 
 
@@ -177,14 +175,14 @@ class TestStep:
             other = complete_state(pair, SECOND, 0.0, 0.0, ground)
             other_end = state_after_step(pair, SECOND, other, ground, ground + change)
             pair[:2], pair[SECOND : SECOND + 2] = start[:2], other[:2]
-            load_pair(pair, row)
+            load_row(pair, row)
             expected = row.copy()
-            assert run_events(expected, LOG, segment, 0.0)
+            assert run_events(expected, LOG, segment, 0.0, False)
             if changes.run_stiffness_changes(
                 pair, row, start, other, end, other_end, segment, -1.0, 1.0
             ):
                 carried += 1
-                load_pair(pair, row)
+                load_row(pair, row)
                 changed += row[0, columns.PHASE] != phase
                 # rounding; a velocity near zero has that of the accelerations over a step
                 assert_allclose(row[:, results], expected[:, results], rtol=1e-10, atol=1e-14)
@@ -200,9 +198,9 @@ class TestStep:
         end = state_after_step(pair, 0, start, 0.0, 0.0)
         segment = segment_of_step(row, 0.0, 0.0, DURATION)
         pair[:2] = start[:2]
-        load_pair(pair, row)
+        load_row(pair, row)
         expected = row.copy()
-        assert run_events(expected, LOG, segment, 0.0)
+        assert run_events(expected, LOG, segment, 0.0, False)
         is_certain, after, _, _ = changes.run_changes(pair, row, 0, start, end, segment)
         assert is_certain
         assert row[0, columns.PHASE] == expected[0, columns.PHASE] == 1.0
@@ -236,13 +234,13 @@ class TestStep:
             side = row[0, columns.PHASE]
             sampled = [start[0]]
             pair[:2], pair[SECOND : SECOND + 2] = start[:2], 0.0
-            load_pair(pair, row)
+            load_row(pair, row)
             single = row.copy()
             # the event code in many parts of the step
             for k in range(20):
                 part = ground + change * np.array([k, k + 1]) / 20
                 piece = segment_of_step(row, *part, DURATION / 20)
-                assert run_events(single, LOG, piece, 0.0)
+                assert run_events(single, LOG, piece, 0.0, False)
                 sampled.append(single[0, columns.U])
             is_certain, _, low, high = changes.run_changes(pair, row, 0, start, end, segment)
             if is_certain:

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.free_impacts import state_inside_step
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, turning_point
-from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.phases import write_constants
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
@@ -27,7 +27,6 @@ def pair_of(damping):
     row = row_at_rest(structure_table(structures), np.array([1.0]), np.array([0.5]))
     pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, DURATION)
-    write_phase(pair, row, DURATION)
     return pair, row
 
 

@@ -1,9 +1,8 @@
 """
 Rows in lanes, so short that they also run uncompiled.
 
-These tests run all of per_obspy.kernels.pounding_rows.building_lanes,
-per_obspy.kernels.pounding_rows.member_phases, per_obspy.kernels.pounding_rows.row_steps,
-per_obspy.kernels.pounding_rows.row_impacts and per_obspy.kernels.pounding_rows.run_rows.
+They run all of per_obspy.kernels.pounding_rows, and per_obspy.kernels.pounding_lanes.run_block for
+rows.
 """
 
 import math
@@ -13,17 +12,19 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pounding_lanes.lanes import (
+    AXIS_COSINE,
     CONTACT_FUNCTION,
     DISPLACEMENT,
     LANE_ROWS,
     PAIR_LANES,
+    ROWS,
     STEP_DISPLACEMENT,
     STEP_VELOCITY,
     TILE_CONTACT,
     TILE_STEPS,
     VELOCITY,
+    sweep_tile,
 )
-from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
 from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
 from per_obspy.pounding.structure import Structure
@@ -99,7 +100,7 @@ def test_a_sweep_is_the_plain_step_of_every_lane(count):
     contact = random.normal(size=(5, PAIR_LANES))
     contact[1, -1] = 0.0  # nothing is on the right of the last lane
     lanes[CONTACT_FUNCTION : CONTACT_FUNCTION + 5] = contact
-    lanes[70] = 1.0  # every row points to the north
+    lanes[AXIS_COSINE] = 1.0  # every row points to the north
     ground = random.normal(size=(2, TILE_STEPS + 1))
 
     # step by step
@@ -112,7 +113,7 @@ def test_a_sweep_is_the_plain_step_of_every_lane(count):
         form = contact[0] * u + contact[1] * np.roll(u, -1) + contact[2] * z
         least = np.minimum(least, form + contact[3] * ground[0, k] + contact[4])
     flat = np.ascontiguousarray(lanes).ravel()
-    sweep_tile(flat, np.zeros(PAIR_LANES, dtype=np.int64), ground, count)
+    sweep_tile(ROWS, flat, np.zeros(PAIR_LANES, dtype=np.int64), ground, count)
     found = flat.reshape(LANE_ROWS, PAIR_LANES)
     # rounding of the sums
     assert_allclose(found[DISPLACEMENT], u, rtol=1e-10, atol=1e-12)

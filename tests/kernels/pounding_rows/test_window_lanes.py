@@ -14,10 +14,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES
+from per_obspy.kernels.pounding_lanes.lanes import LARGEST_RATE, PAIR_LANES, STRUCTURE_ROWS
+from per_obspy.kernels.pounding_lanes.maxima_in_step import raise_maxima
+from per_obspy.kernels.pounding_lanes.phases import write_constants
 from per_obspy.kernels.pounding_rows import window_lanes as window_rows
-from per_obspy.kernels.pounding_rows.member_phases import LARGEST_RATE, write_constants
-from per_obspy.kernels.pounding_rows.pieces import raise_maximum
 
 STEP, COUNT, TERMS = 0.02, 400, window_rows.WINDOW_TERMS
 #: Times at which a motion inside a piece is looked at, as shares of the piece.
@@ -28,17 +28,18 @@ class Buildings:
     """Random elastic buildings in a window, all in motion."""
 
     def __init__(self, random, count=8):
-        self.row, self.members = np.zeros((count, columns.ROW_COLUMNS)), np.zeros((32, LANE_ROWS))
+        self.row = np.zeros((count, columns.ROW_COLUMNS))
+        self.members = np.zeros(count * STRUCTURE_ROWS)
         self.omega = random.uniform(1.0, 30.0, count)
         row = self.row
         row[:, columns.DAMPING_RATE] = random.uniform(0.0, 0.2, count) * self.omega
         row[:, columns.STIFFNESS], row[:, columns.YIELD] = self.omega**2, np.inf
         row[:, columns.MASS], row[:, columns.PARTICIPATION] = 1.0, random.uniform(0.5, 2.0, count)
-        write_constants(self.members[:count], row, 1.0, 0.0, STEP)
+        write_constants(self.members, row, 1.0, 0.0, STEP)
         # Their states, and a ground acceleration with its change over a step
         self.u, self.z = random.normal(0.0, 0.02, (2, count))
         self.ground, self.change = random.normal(size=2)
-        self.longest = window_rows.WINDOW_REACH / self.members[0, LARGEST_RATE]
+        self.longest = window_rows.WINDOW_REACH / self.members[LARGEST_RATE]
         self.window = np.zeros(window_rows.WINDOW_SIZE)
         window_rows.load_buildings(self.members, row, self.window)
         self.lanes(window_rows.NOW)[:count] = self.u
@@ -112,7 +113,7 @@ def test_maxima_in_a_piece():
         some.row[0, columns.LARGEST_DISPLACEMENT] = (1.0 - 1e-9) * u
         some.row[0, columns.LARGEST_RADIUS_SQUARED] = (1.0 - 1e-9) * radius**2
         start, end = tuple(states[0]), tuple(states[-1])
-        raise_maximum(some.members[0], some.row, 0, start, end, some.change, share)
+        raise_maxima(some.members, some.row, 0, start, end, some.change, share)
         # 400 times miss a maximum by an eighth of their squared distance
         assert some.row[0, columns.LARGEST_DISPLACEMENT] == pytest.approx(u, rel=1e-5)
         assert some.row[0, columns.LARGEST_DISPLACEMENT] >= u * (1.0 - 1e-13)
@@ -146,7 +147,7 @@ def test_a_building_that_turns_twice_in_a_piece():
         states = np.array([some.exact(0, share * s) for s in INSIDE])
         start, end = tuple(states[0]), tuple(states[-1])
         some.row[0, columns.LARGEST_DISPLACEMENT] = start[0]
-        raise_maximum(some.members[0], some.row, 0, start, end, some.change, share)
+        raise_maxima(some.members, some.row, 0, start, end, some.change, share)
         largest = states[:, 0].max()
         assert largest > (1.0 + 1e-9) * start[0]
         assert some.row[0, columns.LARGEST_DISPLACEMENT] >= largest * (1.0 - 1e-13)
