@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -116,35 +115,18 @@ def stretches(record: TiledRecord) -> Iterator[TiledRecord]:
         yield TiledRecord(record.north[samples], record.east[samples], peaks, jumps, record.scale)
 
 
-def select_tiles(
-    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
-) -> NDArray[np.int64]:
-    """
-    Raise the largest values to the samples of a stretch and select tiles for the search between.
-
-    Returns
-    -------
-    selected : (n, 2) ndarray of int
-        Tile and lane wherever the bounds allow a larger value between the samples.
-    """
-    tiles = stretch.peaks.shape[1]
-    selected = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.choose_tiles(
-        tile_states, stretch.peaks, stretch.jumps, *block[:3], block.size, largest, selected
-    )
-    return selected[:count]
-
-
 def raise_between_samples(
-    stretch: TiledRecord,
-    block: Oscillators,
-    tile_states: FloatArray,
-    states: FloatArray,
-    selected: NDArray[np.int64],
-    largest: FloatArray,
+    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
 ) -> None:
-    """Raise the largest values by the motion between the samples of tiles, from their states."""
-    blocks.search_tiles(*stretch[:4], *block[:3], tile_states, states, selected, largest)
+    """Raise the largest values to those of a stretch, between the samples too."""
+    limits = np.concatenate([stretch.peaks, stretch.jumps])
+    oscillators = np.stack([block.phases, block.dampings, *block.weights])
+    # Lanes that fill the block up are left out
+    windows = np.zeros((2, blocks.LANES))
+    windows[1] = np.where(np.arange(blocks.LANES) < block.size, np.inf, -1.0)
+    blocks.raise_between_samples(
+        1, stretch.north, stretch.east, limits, oscillators, 0, windows, tile_states, largest
+    )
 
 
 def raise_to_samples(stretch: TiledRecord, tile_states: FloatArray, largest: FloatArray) -> None:
@@ -378,16 +360,6 @@ def row_of(name: str, values: FloatArray) -> FloatArray:
     return values
 
 
-def _raise_between_samples(
-    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
-) -> None:
-    """Raise the largest values to those of a stretch, between the samples too."""
-    # Only the tiles whose bounds allow a larger value are run again
-    selected = select_tiles(stretch, block, tile_states, largest)
-    states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
-    raise_between_samples(stretch, block, tile_states, states, selected, largest)
-
-
 def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
     """Return the largest squared radii, (1, lanes), in units of scaled acceleration / omega²."""
     table = np.empty((radius.ROWS, blocks.LANES))
@@ -402,7 +374,7 @@ def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> Float
         oscillators = block.phases, block.dampings, table
         radius.raise_to_samples(stretch.north, *extremes, *oscillators, tile_states, largest)
         if exact:
-            _raise_between_samples(stretch, block, tile_states, largest)
+            raise_between_samples(stretch, block, tile_states, largest)
     return largest
 
 
@@ -417,7 +389,7 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
         # At all samples
         response.run_response_tiles(stretch.north, stretch.east, packed, tile_states)
         if exact:
-            _raise_between_samples(stretch, block, tile_states, largest)
+            raise_between_samples(stretch, block, tile_states, largest)
         else:
             raise_to_samples(stretch, tile_states, largest)
     response.free_vibration(packed, block.dampings, largest)
