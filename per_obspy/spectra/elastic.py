@@ -123,7 +123,7 @@ def raise_between_samples(
     oscillators = np.stack([block.phases, block.dampings, *block.weights])
     # Lanes that fill the block up are left out
     windows = np.zeros((2, blocks.LANES))
-    windows[1] = np.where(np.arange(blocks.LANES) < block.size, np.inf, -1.0)
+    windows[1, : block.size], windows[1, block.size :] = np.inf, -1.0
     blocks.raise_between_samples(
         1, stretch.north, stretch.east, limits, oscillators, 0, windows, tile_states, largest
     )
