@@ -14,3 +14,32 @@ def aligned(rows, columns):
     memory = np.empty(rows * columns + LINE_NUMBERS)
     start = -(memory.ctypes.data // NUMBER_BYTES) % LINE_NUMBERS
     return memory[start : start + rows * columns].reshape((rows, columns))
+
+
+@kernel
+def aligned_copy(table, rows, columns):
+    """Return a copy of a table, of a size that the compiler knows: it makes vectors."""
+    # An assignment of arrays would compile the text of an error about their shapes
+    local = aligned(rows, columns)
+    for row in range(rows):
+        for column in range(columns):
+            local[row, column] = table[row, column]
+    return local
+
+
+@kernel
+def aligned_line(table, rows, columns):
+    """Return a copy of the first rows of a table in one line, which needs one pointer only."""
+    line = aligned(1, rows * columns)[0]
+    for row in range(rows):
+        for column in range(columns):
+            line[row * columns + column] = table[row, column]
+    return line
+
+
+@kernel
+def store_line(line, table, rows):
+    """Store a line in the first rows of a table."""
+    for row in range(rows):
+        for column in range(table.shape[1]):
+            table[row, column] = line[row * table.shape[1] + column]

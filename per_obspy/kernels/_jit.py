@@ -39,6 +39,13 @@ NO_FOLDER = "no locator available"
 class SharedCache(FunctionCache):
     """Compiled code of one kernel on disk, which several processes may save at the same time."""
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load one signature; none that names a module which an earlier version had."""
+        try:
+            return super().load_overload(sig, target_context)
+        except ImportError:
+            return None
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save one signature; without the lock two processes could give two of them one name."""
         # A folder that cannot be written costs time only: the next start compiles again

@@ -115,6 +115,20 @@ def stretches(record: TiledRecord) -> Iterator[TiledRecord]:
         yield TiledRecord(record.north[samples], record.east[samples], peaks, jumps, record.scale)
 
 
+def raise_between_samples(
+    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
+) -> None:
+    """Raise the largest values to those of a stretch, between the samples too."""
+    limits = np.concatenate([stretch.peaks, stretch.jumps])
+    oscillators = np.stack([block.phases, block.dampings, *block.weights])
+    # Lanes that fill the block up are left out
+    windows = np.zeros((2, blocks.LANES))
+    windows[1, : block.size], windows[1, block.size :] = np.inf, -1.0
+    blocks.raise_between_samples(
+        1, stretch.north, stretch.east, limits, oscillators, 0, windows, tile_states, largest
+    )
+
+
 def over_blocks(
     work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, record: TiledRecord
 ) -> FloatArray:
@@ -331,21 +345,6 @@ def row_of(
     return row
 
 
-def _raise_between_samples(
-    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
-) -> None:
-    """Raise the largest values to those of a stretch, between the samples too."""
-    *samples, peaks, jumps, _ = stretch
-    selected = np.empty((peaks.shape[1] * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.choose_tiles(
-        tile_states, peaks, jumps, *block[:3], block.size, largest, selected
-    )
-    # Only the tiles and lanes whose bounds allow a larger value are run again
-    selected = selected[:count]
-    states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
-    blocks.search_tiles(*samples, peaks, jumps, *block[:3], tile_states, states, selected, largest)
-
-
 def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
     """Return the largest squared radii, (1, lanes), in units of scaled acceleration / omega²."""
     table = np.empty((radius.ROWS, blocks.LANES))
@@ -360,7 +359,7 @@ def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> Float
         oscillators = block.phases, block.dampings, table
         radius.raise_to_samples(stretch.north, *extremes, *oscillators, tile_states, largest)
         if exact:
-            _raise_between_samples(stretch, block, tile_states, largest)
+            raise_between_samples(stretch, block, tile_states, largest)
     return largest
 
 
@@ -375,7 +374,7 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
         # At all samples
         response.run_response_tiles(stretch.north, stretch.east, packed, tile_states)
         if exact:
-            _raise_between_samples(stretch, block, tile_states, largest)
+            raise_between_samples(stretch, block, tile_states, largest)
         else:
             blocks.raise_to_tiles(tile_states, stretch.peaks.shape[1], largest)
     response.free_vibration(packed, block.dampings, largest)

@@ -88,6 +88,20 @@ def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_wa
 
 
 @compiled
+def test_code_that_names_a_module_of_an_earlier_version_is_compiled_again(monkeypatch):
+    # catches an upgrade after which a command ends, because another file was taken out
+    @_jit.kernel
+    def fifth(value):
+        return value / 5.0
+
+    def gone(*_):
+        raise ModuleNotFoundError("No module named 'per_obspy.kernels._earlier'")
+
+    monkeypatch.setattr(caching.FunctionCache, "load_overload", gone)
+    assert fifth(5.0) == 1.0
+
+
+@compiled
 @pytest.mark.parametrize("decorator", DECORATORS)
 def test_compiled_code_is_saved_by_one_process_at_a_time(decorator, monkeypatch):
     # catches two processes that save two signatures under one name: one of them is then loaded for

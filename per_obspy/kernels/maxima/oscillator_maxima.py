@@ -11,19 +11,20 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.maxima.strided_samples import (
+from per_obspy.kernels.maxima.window import find_windows
+from per_obspy.kernels.oscillator.exact_step import unit_responses
+from per_obspy.kernels.oscillator.strides import (
     CHECKPOINT_ROWS,
     DAMPING,
     MAXIMA_LANES,
     OSCILLATOR_ROWS,
+    PHASE,
+    WEIGHTS,
     pack_oscillator,
     run_strides,
 )
-from per_obspy.kernels.maxima.tile_peaks import raise_to_tile_peaks
-from per_obspy.kernels.maxima.window import find_windows
-from per_obspy.kernels.oscillator.exact_step import unit_responses
 from per_obspy.kernels.spectra.response import first_root
-from per_obspy.kernels.spectra.tile_search import TILE
+from per_obspy.kernels.spectra.tile_search import TILE, raise_between_samples
 
 #: Tiles with a checkpoint at a time: memory stays constant however long the record is.
 STRETCH_TILES = 512
@@ -88,7 +89,8 @@ def largest_responses(stride, north, east, limits, groups, width, oscillators, o
             # Store the results; oscillators below their expected displacement come again
             for lane in range(chosen.size):
                 if best[1, lane] >= floors[lane]:
-                    largest[:, chosen[lane]] = best[:, lane]
+                    largest[0, chosen[lane]] = best[0, lane]
+                    largest[1, chosen[lane]] = best[1, lane]
                 else:
                     again[count] = chosen[lane]
                     count += 1
@@ -113,12 +115,19 @@ def _run(stride, north, east, limits, groups, width, table, checkpoints, floors,
     tiles = limits.shape[1]
     windows = np.empty((3, MAXIMA_LANES))
     find_windows(groups, TILE * width, table, floors, bounds, windows)
-    begin = int(windows[0].min()) * width
-    end = min(int(windows[2].max() + 1.0) * width, tiles)
-    # From groups to tiles
-    windows[0] *= width
-    windows[1] *= width
-    windows[2] = (windows[2] + 1.0) * width - 1.0
+    begin, end = tiles, 0
+    counted, oscillators = np.empty((2, MAXIMA_LANES)), np.empty((4, MAXIMA_LANES))
+    for lane in range(MAXIMA_LANES):
+        # From groups to tiles
+        windows[0, lane] *= width
+        counted[0, lane] = windows[1, lane] * width
+        counted[1, lane] = (windows[2, lane] + 1.0) * width - 1.0
+        begin, end = min(begin, int(windows[0, lane])), max(end, int(counted[1, lane] + 1.0))
+        # Numbers for the search between samples
+        oscillators[0, lane], oscillators[1, lane] = table[PHASE, lane], table[DAMPING, lane]
+        oscillators[2, lane] = table[WEIGHTS, lane]
+        oscillators[3, lane] = table[WEIGHTS + 1, lane]
+    end = min(end, tiles)
     best[:] = 0.0
     # Stretch by stretch: first the samples, then the peaks between them
     for stretch in range(begin - begin % STRETCH_TILES, end, STRETCH_TILES):
@@ -126,14 +135,14 @@ def _run(stride, north, east, limits, groups, width, table, checkpoints, floors,
         last = min(end, stretch + STRETCH_TILES)
         samples = slice(first * TILE, last * TILE + 1)
         run_strides(stride, north[samples], east[samples], first, windows[0], table, checkpoints)
-        raise_to_tile_peaks(
+        raise_between_samples(
             stride,
             north[samples],
             east[samples],
             limits[:, first:last],
+            oscillators,
             first,
-            windows[1:],
-            table,
+            counted,
             checkpoints,
             best,
         )

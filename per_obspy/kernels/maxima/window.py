@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.maxima.strided_samples import DAMPING, MAXIMA_LANES, PHASE, WEIGHTS
+from per_obspy.kernels.oscillator.strides import DAMPING, MAXIMA_LANES, PHASE, WEIGHTS
 
 #: Largest remainder of a response that is not computed, over the floor: a thousandth of the
 #: promised exactness.

@@ -1,19 +1,25 @@
 r"""
-Largest values between two samples, exact, by Taylor series and the roots of their derivatives.
+The search inside a step: largest values between two samples, exact, and bounds that rule steps out.
 
-The radius is stationary where ``z = 0`` or ``2 xi z + a = 0``, the displacement where ``z = 0``,
+The radius is stationary where ``2 xi z + a = 0`` or ``z = 0``, the displacement where ``z = 0``,
 the velocity where ``z' = 0``, the absolute acceleration ``-(u + 2 xi z)`` where ``z + 2 xi z' =
-0``. The second derivative of each condition solves the homogeneous equation of the oscillator, so
-that it has at most one root in a span of half a radian. That root bounds the pieces on which the
-first derivative is monotone, whose roots bound the pieces on which the condition is monotone: no
-stationary point can be missed. Displacements are counted in ``a / omega²``, time as phase.
+0``. A condition whose slope at one end of a step exceeds its largest change over the step has one
+root at most, which lies close to that of the cubic with the same values and slopes at both ends;
+Newton's method on the Taylor series corrects it.
+
+In other steps every root is found. The second derivative of each condition solves the homogeneous
+equation of the oscillator, so that it has at most one root in a span of half a radian. That root
+bounds the pieces on which the first derivative is monotone, whose roots bound the pieces on which
+the condition is monotone: no stationary point can be missed. Displacements are counted in ``a /
+omega²``, time as phase. Largest values are squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|``;
+infinite ones do not count.
 """
 
 import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import kernel, lean
 
 #: Longest span of one series, in phase.
 LONGEST_SPAN = 0.5
@@ -26,11 +32,14 @@ POINTS = 9
 #: At a stationary point an error of the root changes the value by its square only.
 ROOT_TOLERANCE = 1e-8
 ROOT_STEPS = 60
+#: Newton steps on the cubic, and on the series at most; shift of a root whose third power is
+#: rounding, in phase and as a part of the step.
+CUBIC_STEPS, SERIES_STEPS, SMALL_SHIFT, SMALL_PART = 2, 4, 1e-5, 3e-4
 #: ``1 / ((n + 2) (n + 1))``: a division takes as long as three multiply-adds.
 INVERSES = tuple(1.0 / ((n + 2) * (n + 1)) for n in range(TERMS))
 
 
-@kernel
+@lean
 def series_terms(span):
     """Return the number of terms after which a series may end."""
     terms = 4
@@ -41,7 +50,7 @@ def series_terms(span):
     return terms
 
 
-@kernel
+@lean
 def fill_series(u, z, acceleration, rate, stiffness, damping, terms, displacement, velocity):
     """
     Fill the Taylor coefficients of displacement and velocity from the state at the start.
@@ -62,24 +71,28 @@ def fill_series(u, z, acceleration, rate, stiffness, damping, terms, displacemen
         velocity[n] = (n + 1) * displacement[n + 1]
 
 
-@kernel
-def fill_condition(number, acceleration, rate, damping, terms, velocity, condition):
-    """
-    Fill the coefficients of a condition that vanishes at stationary points.
-
-    Conditions by number: ``2 xi z + a``, ``z``, ``z'``, ``z + 2 xi z'``.
-    """
-    # Factors of z and of z'
-    level = 2.0 * damping if number == 0 else (0.0 if number == 2 else 1.0)
-    slope = 0.0 if number < 2 else (1.0 if number == 2 else 2.0 * damping)
-    for n in range(terms):
-        condition[n] = level * velocity[n] + slope * (n + 1) * velocity[n + 1]
+@lean
+def _factors(number, damping):
+    """Return the factors of z, z' and the acceleration in a condition, in the module's order."""
+    viscosity = 2.0 * damping
     if number == 0:
-        condition[0] += acceleration
-        condition[1] += rate
+        return viscosity, 0.0, 1.0
+    if number == 1:
+        return 1.0, 0.0, 0.0
+    return (0.0, 1.0, 0.0) if number == 2 else (1.0, viscosity, 0.0)
 
 
-@kernel
+@lean
+def _condition(number, u, z, acceleration, rate, damping):
+    """Return a condition and its derivative with respect to the phase, from the state."""
+    level, slope, ground = _factors(number, damping)
+    first = -(2.0 * damping * z + u + acceleration)
+    second = -(2.0 * damping * first + z + rate)
+    value = level * z + slope * first + ground * acceleration
+    return value, level * first + slope * second + ground * rate
+
+
+@lean
 def derivative(series, terms, order, phase):
     """Return the value (order 0), first or second derivative of a series."""
     total = 0.0
@@ -89,7 +102,7 @@ def derivative(series, terms, order, phase):
     return total
 
 
-@kernel
+@lean
 def is_monotone(series, terms, span):
     """Return whether the linear term outweighs all higher ones over the whole span."""
     higher = 0.0
@@ -98,7 +111,7 @@ def is_monotone(series, terms, span):
     return higher * span < abs(series[1])
 
 
-@kernel
+@lean
 def bracketed_root(series, terms, order, left, right, at_left, at_right):
     """Return the root between two phases with values of opposite sign (regula falsi, Illinois)."""
     tolerance = ROOT_TOLERANCE * (right - left)
@@ -121,7 +134,7 @@ def bracketed_root(series, terms, order, left, right, at_left, at_right):
     return phase
 
 
-@kernel
+@lean
 def stationary_phases(series, terms, span, points):
     """
     Fill the points with both ends and every root of the series in between; return their number.
@@ -151,13 +164,13 @@ def stationary_phases(series, terms, span, points):
     return count
 
 
-@kernel
+@lean
 def largest_in_step(u, z, start, end, damping, phase, selected, work, largest):
     """
-    Raise the largest values to those at the selected stationary points of a step.
+    Raise the largest values to those at the stationary points of a step.
 
-    The values are squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|``. The step starts from the
-    state ``u, z`` and the acceleration goes from start to end; long steps are cut into spans.
+    Conditions are selected by the bits of a number. The step starts from the state ``u, z`` and the
+    acceleration goes from start to end; long steps are cut into spans.
     """
     spans = math.ceil(phase / LONGEST_SPAN)
     span = phase / spans
@@ -169,22 +182,27 @@ def largest_in_step(u, z, start, end, damping, phase, selected, work, largest):
         acceleration = start + rate * (i * span)
         fill_series(u, z, acceleration, rate, 1.0, damping, terms, displacement, velocity)
         for number in range(4):
-            if selected[number]:
+            if selected >> number & 1:
+                # Series of the condition
+                level, slope, ground = _factors(number, damping)
+                for n in range(terms - 1):
+                    condition[n] = level * velocity[n] + slope * (n + 1) * velocity[n + 1]
+                condition[0] += ground * acceleration
+                condition[1] += ground * rate
                 # Raise all four values to those at the stationary points inside
-                fill_condition(number, acceleration, rate, damping, terms - 1, velocity, condition)
                 count = stationary_phases(condition, terms - 1, span, points)
                 for k in range(1, count - 1):
-                    raise_values(displacement, velocity, terms, points[k], damping, largest)
+                    _raise_at(displacement, velocity, terms, points[k], damping, largest)
         # The end of the span starts the next one
-        u, z = raise_values(displacement, velocity, terms, span, damping, largest)
+        u, z = _raise_at(displacement, velocity, terms, span, damping, largest)
 
 
-@kernel
-def raise_values(displacement, velocity, terms, phase, damping, largest):
+@lean
+def _raise_at(displacement, velocity, terms, phase, damping, largest):
     """Raise the largest values to those at a phase; return displacement and velocity there."""
+    # Displacement, velocity, and the four quantities
     u = derivative(displacement, terms, 0, phase)
     z = derivative(velocity, terms, 0, phase)
-    # Squared radius, displacement, velocity, absolute acceleration
     largest[0] = max(largest[0], u * u + z * z)
     largest[1] = max(largest[1], abs(u))
     largest[2] = max(largest[2], abs(z))
@@ -192,7 +210,7 @@ def raise_values(displacement, velocity, terms, phase, damping, largest):
     return u, z
 
 
-@kernel
+@lean
 def radius_bound(square, peak, damping, phase):
     """
     Return a bound of the radius within half a step of samples with this squared radius.
@@ -202,7 +220,7 @@ def radius_bound(square, peak, damping, phase):
     return (math.sqrt(square) + 0.5 * phase * peak) * math.exp(damping * phase)
 
 
-@kernel
+@lean
 def rate_bounds(radius, peak, jump, damping, phase):
     """
     Return bounds, times the phase of a step, of ``|z'|``, ``|z''|`` and ``|(r²)''|``.
@@ -216,7 +234,7 @@ def rate_bounds(radius, peak, jump, damping, phase):
     return first, second, square
 
 
-@kernel
+@lean
 def slacks(rates, damping, phase):
     """
     Return bounds of how far values between two samples can exceed those at the samples.
@@ -234,7 +252,7 @@ def slacks(rates, damping, phase):
     )
 
 
-@kernel
+@lean
 def velocity_slack(highest, rates, jump, damping, phase):
     """
     Return a bound of how far ``|z|`` between two samples can exceed the highest sample.
@@ -248,7 +266,7 @@ def velocity_slack(highest, rates, jump, damping, phase):
     return eighth * min(second, stiff)
 
 
-@kernel
+@lean
 def step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase):
     """
     Return a bound of ``|z|`` in a step.
@@ -280,7 +298,7 @@ def step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase):
     return max(abs(z), abs(z_end), abs(z + 0.25 * first), abs(z_end - 0.25 * first_end), middle)
 
 
-@kernel
+@lean
 def may_exceed(u, z, start, end, damping, phase, largest):
     """
     Return whether a step may hold a new largest value.
@@ -303,64 +321,138 @@ def may_exceed(u, z, start, end, damping, phase, largest):
     )
 
 
-@kernel
-def sags(rates, damping, phase):
+@lean
+def raise_in_step(ends, radius, damping, phase, terms, work, best):
     """
-    Return bounds of how far the conditions can leave the straight line between two samples.
+    Raise the largest values to those at the stationary points of a step.
 
-    The conditions are ``2 xi z + a``, ``z``, ``z'`` and ``z + 2 xi z'``. Each bound is ``phase² /
-    8`` times one of the second derivative, which for ``z'`` is ``-2 xi z'' - z'``.
+    Parameters
+    ----------
+    ends : tuple of float
+        u, z and the acceleration before and after the step.
+    radius : float
+        Bound of the radius in the step.
+    damping, phase : float
+        Fraction of critical; phase ``omega * dt`` of the step, rad.
+    terms : int
+        Of the series of a step, from `series_terms`.
+    work, best : ndarray from `workspace`, (4,) ndarray
+        Room; largest values so far, infinite where a quantity does not count, raised in place.
     """
-    first, second, _ = rates
-    z = 0.125 * phase * second
-    z_rate = 0.125 * phase * (2.0 * damping * second + first)
-    return 2.0 * damping * z, z, z_rate, z + 2.0 * damping * z_rate
-
-
-@kernel
-def may_vanish(at_start, at_end, sag):
-    """Return whether a function that leaves its chord by at most the sag can have a root."""
-    return at_start * at_end <= 0.0 or min(abs(at_start), abs(at_end)) <= sag
-
-
-@kernel
-def select_conditions(
-    u, z, start, u_end, z_end, end, damping, phase, radius, quantities, largest, selected
-):
-    """
-    Select the stationary points of a step that may raise the largest values; return if any.
-
-    They are numbered as in `fill_condition`. A point is selected if the bound of its quantity
-    exceeds the largest value and its condition may vanish in the step; those of the displacement
-    are also the radius's.
-    """
+    u, z, start, _, _, end = ends
     # Long steps: rule the whole step out first
-    if phase > LONGEST_SPAN and not may_exceed(u, z, start, end, damping, phase, largest):
-        return False
-    viscosity = 2.0 * damping
+    if phase > LONGEST_SPAN and not may_exceed(u, z, start, end, damping, phase, best):
+        return
     rates = rate_bounds(radius, max(abs(start), abs(end)), abs(end - start), damping, phase)
+    selected = _select(ends, rates, damping, phase, best)
+    # Short steps: the one root of a condition
+    if phase <= LONGEST_SPAN:
+        for number in range(4):
+            if selected >> number & 1 and raise_to_root(
+                number, ends, rates, damping, phase, terms, work, best
+            ):
+                selected -= 1 << number
+    # Long steps, and conditions that may have several roots: every stationary point
+    if selected:
+        largest_in_step(u, z, start, end, damping, phase, selected, work, best)
+
+
+@lean
+def _select(ends, rates, damping, phase, best):
+    """Return the conditions that may vanish in a step where a value may exceed the largest one."""
+    u, z, start, u_end, z_end, end = ends
+    viscosity = 2.0 * damping
     slack = slacks(rates, damping, phase)
-    sag = sags(rates, damping, phase)
-    # Radius: stationary where 2 xi z + a = 0
-    higher = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > largest[0]
-    selected[0] = higher and may_vanish(viscosity * z + start, viscosity * z_end + end, sag[0])
-    selected[1] = selected[2] = selected[3] = False
-    if quantities > 1:
-        absolute = u + viscosity * z
-        absolute_end = u_end + viscosity * z_end
-        # Derivative z' at the ends, from the equation of motion
-        z_rate = -absolute - start
-        z_rate_end = -absolute_end - end
-        higher |= max(abs(u), abs(u_end)) + slack[1] > largest[1]
-        # Velocity: stationary where z' = 0
-        if step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase) > largest[2]:
-            selected[2] = may_vanish(z_rate, z_rate_end, sag[2])
-        # Absolute acceleration: stationary where z + 2 xi z' = 0
-        if max(abs(absolute), abs(absolute_end)) + slack[3] > largest[3]:
-            selected[3] = may_vanish(z + viscosity * z_rate, z_end + viscosity * z_rate_end, sag[3])
-    # Radius and displacement: stationary where z = 0
-    selected[1] = higher and may_vanish(z, z_end, sag[1])
-    return selected[0] or selected[1] or selected[2] or selected[3]
+    # Bit 0: the radius; bit 1: radius or displacement, which share z = 0
+    selected = 0
+    if max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > best[0]:
+        selected = 3
+    if max(abs(u), abs(u_end)) + slack[1] > best[1]:
+        selected |= 2
+    # Velocity by its own bound, absolute acceleration
+    if best[2] < np.inf and (
+        step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase) > best[2]
+    ):
+        selected |= 4
+    if max(abs(u + viscosity * z), abs(u_end + viscosity * z_end)) + slack[3] > best[3]:
+        selected |= 8
+    # A condition that keeps further from zero than from its chord has no root
+    for number in range(4):
+        if selected >> number & 1:
+            before, _ = _condition(number, u, z, start, 0.0, damping)
+            after, _ = _condition(number, u_end, z_end, end, 0.0, damping)
+            sag = 0.125 * phase * _change_of_slope(number, rates, damping)
+            if before * after > 0.0 and min(abs(before), abs(after)) > sag:
+                selected -= 1 << number
+    return selected
+
+
+@lean
+def _change_of_slope(number, rates, damping):
+    """Return a bound of a condition's second derivative, times the phase of a step."""
+    level, slope, _ = _factors(number, damping)
+    # The third derivative of z is -2 xi z'' - z'
+    return level * rates[1] + slope * (2.0 * damping * rates[1] + rates[0])
+
+
+@lean
+def raise_to_root(number, ends, rates, damping, phase, terms, work, best):
+    """
+    Raise the largest values to the one at the root of a condition in a short step.
+
+    ``ends``: u, z and the acceleration before and after the step. Returns whether it is certain
+    that there is no other root.
+    """
+    # Value and slope of the condition at both ends
+    rate = (ends[5] - ends[2]) / phase
+    start = _condition(number, ends[0], ends[1], ends[2], rate, damping)
+    end = _condition(number, ends[3], ends[4], ends[5], rate, damping)
+    # Monotone if a slope exceeds the largest change of slope over the step
+    if max(abs(start[1]), abs(end[1])) <= _change_of_slope(number, rates, damping):
+        return False
+    if start[0] * end[0] >= 0.0:
+        return True
+    displacement, velocity = work[0], work[1]
+    fill_series(ends[0], ends[1], ends[2], rate, 1.0, damping, terms, displacement, velocity)
+    # Newton's method on the series, from the root of the cubic
+    root = phase * _cubic_root(start, end, phase)
+    for _ in range(SERIES_STEPS):
+        u = derivative(displacement, terms, 0, root)
+        z = derivative(velocity, terms, 0, root)
+        value, slope = _condition(number, u, z, ends[2] + rate * root, rate, damping)
+        shift = -value / slope
+        if abs(shift) <= min(SMALL_SHIFT, SMALL_PART * phase):
+            break
+        root = min(max(root + shift, 0.0), phase)
+    # Value at the root, to second order in the last shift; (r²)' = -2 z (2 xi z + a)
+    half = 0.5 * shift * value
+    if number == 0:
+        best[0] = max(best[0], u * u + z * z - 2.0 * z * half)
+    elif number == 1:
+        best[1] = max(best[1], abs(u + half))
+        best[0] = max(best[0], (u + half) * (u + half))
+    elif number == 2:
+        best[2] = max(best[2], abs(z + half))
+    else:
+        best[3] = max(best[3], abs(u + 2.0 * damping * z + half))
+    return True
+
+
+@lean
+def _cubic_root(start, end, phase):
+    """Return the part of a step at which the cubic with these values and slopes nearly vanishes."""
+    # Coefficients of the cubic in the part of the step
+    value, slope, slope_end = start[0], phase * start[1], phase * end[1]
+    change = end[0] - value
+    square = 3.0 * change - 2.0 * slope - slope_end
+    cube = slope + slope_end - 2.0 * change
+    # Newton's method from the root of the chord
+    part = -value / change
+    for _ in range(CUBIC_STEPS):
+        height = value + part * (slope + part * (square + part * cube))
+        steepness = slope + part * (2.0 * square + 3.0 * part * cube)
+        part = min(max(part - height / steepness, 0.0), 1.0) if steepness != 0.0 else part
+    return part
 
 
 @kernel

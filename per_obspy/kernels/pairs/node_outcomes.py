@@ -94,9 +94,11 @@ def fill_velocities(motion, scales, gaps, out):
     integers = np.empty(gaps.shape[1], np.int64)
     for pair in range(gaps.shape[0]):
         # Pair by pair, as the velocities of outcomes
-        work[0], work[1] = scales[pair], gaps[pair]
+        for node in range(gaps.shape[1]):
+            work[0, node], work[1, node] = scales[pair, node], gaps[pair, node]
         _velocities(motion[:, pair], work, integers)
-        out[pair] = work[2]
+        for node in range(gaps.shape[1]):
+            out[pair, node] = work[2, node]
 
 
 @kernel
@@ -189,14 +191,18 @@ def _smoothing(demands, largest, deviation, logs, sorted_logs, integers):
     for node in range(count):
         logs[node] = max(demands[node], floor)
     logarithms(logs, integers)
-    mean = logs.mean()
-    square = 0.0
+    # Standard deviation of the logarithms
+    total = square = 0.0
+    for node in range(count):
+        total += logs[node]
+    mean = total / count
     for node in range(count):
         square += (logs[node] - mean) ** 2
     spread = math.sqrt(square / count)
     if spread > deviation * math.sqrt(count):
         # the smaller of two measures of spread: few nodes far off do not count
-        sorted_logs[:] = logs
+        for node in range(count):
+            sorted_logs[node] = logs[node]
         lower = _quantile(sorted_logs, 0.25)
         upper = _quantile(sorted_logs, 0.75)
         spread = min(spread, (upper - lower) / NORMAL_QUARTILES)

@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from per_obspy.kernels._aligned import aligned_copy
 from per_obspy.kernels._jit import kernel
 
 #: Pairs of a block: its arrays stay in the first-level cache.
@@ -67,7 +68,8 @@ def estimate(arguments, begin, end, status, branches, bounds):
     states = np.empty((4, PAIRS))
     # Lanes of an incomplete block have a motion that is over at once
     constants = np.zeros((11, PAIRS))
-    constants[:2] = constants[10] = 1.0
+    for pair in range(PAIRS):
+        constants[0, pair] = constants[1, pair] = constants[10, pair] = 1.0
     times = np.empty(PAIRS)
     for first in range(begin, end, PAIRS):
         # Step i: grazing states
@@ -177,8 +179,7 @@ def _first_contact(constants, first_contact):
     passes the first root. A pair that has arrived stays, however long the others of its block go
     on.
     """
-    c, times, advances = np.empty((11, PAIRS)), np.zeros(PAIRS), np.ones(PAIRS)
-    c[:] = constants
+    c, times, advances = aligned_copy(constants, 11, PAIRS), np.zeros(PAIRS), np.ones(PAIRS)
     moving = True
     while moving:
         for pair in range(PAIRS):
@@ -203,15 +204,21 @@ def _first_contact(constants, first_contact):
         moving = False
         for pair in range(PAIRS):
             moving = moving or advances[pair] > 0.0
-    first_contact[:] = times
+    for pair in range(PAIRS):
+        first_contact[pair] = times[pair]
 
 
 @kernel
 def _impact(arguments, first, pairs, constants, times, branch):
     """Fill the states of a block at contact and after it, radii, amplifications and energies."""
-    c, given, fields = np.empty((11, PAIRS)), np.ones((7, PAIRS)), np.empty((13, PAIRS))
+    c, given, fields = (
+        aligned_copy(constants, 11, PAIRS),
+        np.ones((7, PAIRS)),
+        np.empty((13, PAIRS)),
+    )
     # Local copies, filled up with ones
-    c[:], fields[0] = constants, times
+    for pair in range(PAIRS):
+        fields[0, pair] = times[pair]
     for row in range(7):
         for pair in range(pairs):
             given[row, pair] = arguments[row, first + pair]
@@ -292,8 +299,8 @@ def _largest_radius(arguments, body, first, pairs, bounds):
 @kernel
 def _scan(constants, peaks):
     """Fill phases (two rows) and heights (two rows) of the two highest peaks of the scan."""
-    c, p = np.empty((7, PAIRS)), np.zeros((6, PAIRS))  # two more rows: heights at two phases
-    c[:] = constants
+    # Two more rows: heights at two phases
+    c, p = aligned_copy(constants, 7, PAIRS), np.zeros((6, PAIRS))
     for pair in range(PAIRS):
         p[5, pair] = _radius_squared(c, pair, SCAN_PHASES[0])
     for node in range(SCAN_PHASES.size):
@@ -310,15 +317,16 @@ def _scan(constants, peaks):
             p[2, pair] = height if highest else p[2, pair]
             p[0, pair] = y if highest else p[0, pair]
             p[4, pair], p[5, pair] = middle, right
-    peaks[:] = p[:4]
+    for row in range(4):
+        for pair in range(PAIRS):
+            peaks[row, pair] = p[row, pair]
 
 
 @kernel
 def _refine(constants, peaks):
     """Raise both peaks to the maximum between the neighbouring phases by golden sections."""
-    c, left, right = np.empty((7, PAIRS)), np.empty(PAIRS), np.empty(PAIRS)
+    c, left, right = aligned_copy(constants, 7, PAIRS), np.empty(PAIRS), np.empty(PAIRS)
     inner, outer = np.empty((2, PAIRS)), np.empty((2, PAIRS))  # phases and heights
-    c[:] = constants
     for peak in range(2):
         # Bracket between the neighbouring phases, and its two inner points
         for pair in range(PAIRS):

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._aligned import aligned, aligned_copy
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import (
     integrals,
@@ -65,7 +65,10 @@ def input_moments(lagged, firsts, dt, omega, damping, order, moments):
     limits = np.empty(MOMENT_LANES)
     tails = _tails(lagged, firsts)
     # Sums of a0 a0, a0 a1 and a1 a1 over all steps
-    squares = np.stack((lagged[:, 0], lagged[:, 1], lagged[:, 0] - firsts[:, 0]), axis=1)
+    squares = np.empty((3, 3))
+    for row in range(3):
+        squares[row, 0], squares[row, 1] = lagged[row, 0], lagged[row, 1]
+        squares[row, 2] = lagged[row, 0] - firsts[row, 0]
     for first in range(0, order.size, MOMENT_LANES):
         # Fill a block, the last one with copies of its last oscillator
         chosen = order[first : first + MOMENT_LANES]
@@ -75,7 +78,9 @@ def input_moments(lagged, firsts, dt, omega, damping, order, moments):
             decay = math.exp(-damping[index] * omega[index] * dt * LAG_TILE)
             limits[lane] = _limit(decay, tails)
         _sum_backwards(lagged, firsts, limits, table)
-        sums[:] = table[SUMS:]
+        for row in range(6):
+            for lane in range(MOMENT_LANES):
+                sums[row, lane] = table[SUMS + row, lane]
         # Moments: weights of one step times the sums of products over all steps
         for lane in range(chosen.size):
             index = chosen[lane]
@@ -96,12 +101,12 @@ def _tails(lagged, firsts):
         # Sizes from the last tile on
         sizes = np.zeros(tiles + 1)
         for tile in range(tiles - 1, -1, -1):
-            lags = slice(tile * LAG_TILE, (tile + 1) * LAG_TILE)
-            sizes[tile] = (
-                sizes[tile + 1] + np.abs(lagged[row, lags]).sum() + np.abs(firsts[row, lags]).sum()
-            )
+            sizes[tile] = sizes[tile + 1]
+            for lag in range(tile * LAG_TILE, (tile + 1) * LAG_TILE):
+                sizes[tile] += abs(lagged[row, lag]) + abs(firsts[row, lag])
         if sizes[0] > 0.0:
-            tails = np.maximum(tails, sizes / sizes[0])
+            for tile in range(tiles + 1):
+                tails[tile] = max(tails[tile], sizes[tile] / sizes[0])
     return tails
 
 
@@ -134,8 +139,8 @@ def _sum_backwards(lagged, firsts, limits, table):
     ``sum over k of M^k ((1, 0) lagged[k + 2] + rest firsts[k + 1])``, from the largest lag of each
     oscillator down.
     """
-    t = aligned(MOMENT_ROWS, MOMENT_LANES)  # of a size that the compiler knows: it makes vectors
-    t[:] = table
+    # Of a size that the compiler knows
+    t = aligned_copy(table, MOMENT_ROWS, MOMENT_LANES)
     for tile in range(math.ceil(limits.max()) - 1, -1, -1):
         # Oscillators begin at their own largest lag
         for row in range(SUMS, MOMENT_ROWS):
@@ -143,7 +148,7 @@ def _sum_backwards(lagged, firsts, limits, table):
                 t[row, lane] = t[row, lane] if tile + 1 < limits[lane] else 0.0
         for k in range((tile + 1) * LAG_TILE - 4, tile * LAG_TILE - 4, -4):
             for row in range(3):
-                # Products of four lags
+                # Products of four lags, with the first sample and with all
                 x0, x1 = lagged[row, k + 2], lagged[row, k + 3]
                 x2, x3 = lagged[row, k + 4], lagged[row, k + 5]
                 y0, y1 = firsts[row, k + 1], firsts[row, k + 2]
@@ -154,7 +159,15 @@ def _sum_backwards(lagged, firsts, limits, table):
                     u, z = _moved(t, lane, u, z, x2, y2)
                     u, z = _moved(t, lane, u, z, x1, y1)
                     t[6 + 2 * row, lane], t[7 + 2 * row, lane] = _moved(t, lane, u, z, x0, y0)
-    table[:] = t
+    _store_sums(t, table)
+
+
+@kernel
+def _store_sums(t, table):
+    """Store the sums of a block."""
+    for row in range(SUMS, MOMENT_ROWS):
+        for lane in range(MOMENT_LANES):
+            table[row, lane] = t[row, lane]
 
 
 @kernel

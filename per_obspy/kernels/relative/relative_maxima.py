@@ -151,10 +151,11 @@ def _run_block(ground, dt, block, count, inputs, bounds, limits, checkpoints, be
     floors, forgotten = limits
     find_pair_windows(GROUP * TILE * dt, block, bounds, floors, forgotten, windows)
     # From groups to tiles; copies are not counted
-    windows[0] *= GROUP
-    windows[1] = np.minimum((windows[1] + 1) * GROUP, inputs.shape[0]) - 1
-    windows[1, count:] = -1
     tiles = inputs.shape[0]
+    for lane in range(PAIR_LANES):
+        windows[0, lane] *= GROUP
+        last = min((windows[1, lane] + 1) * GROUP, tiles) - 1
+        windows[1, lane] = last if lane < count else -1
     _shake(ground, dt, block, table, checkpoints, inputs, windows, best)
     # Free vibration of those that count up to the end
     for lane in range(PAIR_LANES):
@@ -172,8 +173,10 @@ def _pack(block, dt, table):
 @kernel
 def _shake(ground, dt, block, table, checkpoints, inputs, windows, best):
     """Raise the largest values to those during the parts of the record that count."""
-    end = windows[1].max() + 1
-    for first in range(windows[0].min(), end, TILES):
+    begin, end = windows[0, 0], 0
+    for lane in range(PAIR_LANES):
+        begin, end = min(begin, windows[0, lane]), max(end, windows[1, lane] + 1)
+    for first in range(begin, end, TILES):
         # A stretch: first the samples, then the peaks between them
         last = min(first + TILES, end)
         samples = ground[:, first * TILE : last * TILE + 1]
@@ -185,8 +188,8 @@ def _shake(ground, dt, block, table, checkpoints, inputs, windows, best):
 def _whole_tiles(north, east):
     """Return both components, filled up with zeros to a whole number of tiles and one sample."""
     ground = np.zeros((2, -(-(north.size - 1) // TILE) * TILE + 1))
-    ground[0, : north.size] = north
-    ground[1, : east.size] = east
+    for i in range(north.size):
+        ground[0, i], ground[1, i] = north[i], east[i]
     return ground
 
 
@@ -245,7 +248,7 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
     # The tiles of the largest bounds first: few others remain
     for lane in range(PAIR_LANES):
         for side in range(2):
-            tile = highest[side, lane]
+            tile = int(highest[side, lane])
             if tile >= 0:
                 _search(ground, dt, block, table, lane, checkpoints, inputs, tile, best)
     # Limits of the bounds of tiles that need no search, from margins over all tiles
@@ -304,7 +307,7 @@ def _raise_velocities(dt, checkpoints, tiles, first, windows, best):
     # A reach is a third of what a velocity adds per step
     for lane in range(PAIR_LANES):
         best[lane, 2] = max(best[lane, 2], 3.0 / dt * sampled[2, lane])
-    return highest.astype(np.int64)
+    return highest
 
 
 @lean

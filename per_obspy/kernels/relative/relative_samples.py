@@ -12,7 +12,7 @@ coefficients, ``d + dt v / 3`` at its start and ``d - dt v / 3`` at its end; nea
 exceed it by a third of what the peak exceeds the samples at most.
 """
 
-from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._aligned import aligned_line
 from per_obspy.kernels._jit import inlined, kernel, lean, vectorised
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
@@ -111,8 +111,7 @@ def run_pair_tiles(north, east, first_tile, windows, table, checkpoints):
     ``first_tile``; ``windows`` (2, lanes): the tile before which each pair is at rest, and the last
     one that counts; ``checkpoints`` (tile, row, lane).
     """
-    local = aligned(1, LOCAL * PAIR_LANES)[0]
-    local[:] = table[:LOCAL].ravel()
+    local = aligned_line(table, LOCAL, PAIR_LANES)
     for first in range(0, north.size - 1, TILE):
         # Pairs that start here, and the states before the tile
         tile, place = first_tile + first // TILE, first // TILE

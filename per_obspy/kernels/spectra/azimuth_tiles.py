@@ -12,10 +12,10 @@ its second derivative at most. Displacements are counted in ``a / omega²``, tim
 
 import math
 
-from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._aligned import aligned_line, store_line
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
-from per_obspy.kernels.oscillator.exact_stride import fill_stride_weights
+from per_obspy.kernels.oscillator.strides import fill_stride_weights
 from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE
 
 #: Steps after which the state is looked at. With 8, tiles that hold no maximum pass for it twice as
@@ -47,7 +47,7 @@ def pack(phases, dampings, table):
     table : (ROWS, LANES) ndarray
         Receives a state of zero, matrix and weights of a stride, and the numbers of the bounds.
     """
-    table[:MATRIX] = 0.0
+    table[:] = 0.0
     for lane in range(LANES):
         phase, damping = phases[lane], dampings[lane]
         stride_matrix = step_coefficients(1.0, damping, STRIDE * phase)
@@ -80,8 +80,7 @@ def run_azimuth_tiles(north, east, peaks, jumps, table, checkpoints):
         displacement over all azimuths, at its samples and between them.
     """
     # One line of memory with places that the compiler knows: it needs one pointer, not one per row
-    t = aligned(1, ROWS * LANES)[0]
-    t[:] = table.ravel()
+    t = aligned_line(table, ROWS, LANES)
     for tile in range(peaks.shape[1]):
         _open_tile(t, checkpoints[tile])
         push = 0.0
@@ -123,7 +122,7 @@ def run_azimuth_tiles(north, east, peaks, jumps, table, checkpoints):
         peak = math.hypot(peaks[0, tile], peaks[1, tile])
         _close_tile(t, push, peak, math.hypot(jumps[0, tile], jumps[1, tile]), checkpoints[tile])
     # State for the next stretch of the record
-    table[:MATRIX] = t[: MATRIX * LANES].reshape((MATRIX, LANES))
+    store_line(t, table, MATRIX)
 
 
 @kernel

@@ -39,9 +39,8 @@ def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
     # All problems next to each other, in pieces short enough for the series
     _raise_to_pieces(problems, phase, damping, share, squares, doubts)
     # Doubtful ones alone: at z = 0, for the radius also at 2 xi z + a = 0
-    largest, selected, work = np.empty(4), np.zeros(4, np.bool_), workspace()
-    selected[0] = share == 1.0
-    selected[1] = True
+    largest, work = np.empty(4), workspace()
+    selected = 3 if share == 1.0 else 2
     for lane in range(count):
         if doubts[lane] > 0.0:
             largest[:] = 0.0

@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._aligned import aligned, aligned_line
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
-from per_obspy.kernels.oscillator.exact_stride import fill_stride_weights
+from per_obspy.kernels.oscillator.strides import fill_stride_weights
 from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE, raise_to_tiles
 
 #: Steps after which the radius is looked at. The more, the fewer operations per step, and the more
@@ -83,9 +83,7 @@ def run_strides(acceleration, table, checkpoints):
         after its strides, in the unit of the acceleration (over ``omega²``) or its square.
     """
     # One line of memory with places that the compiler knows: it needs one pointer, not one per row
-    t = aligned(1, LOCAL * LANES)[0]
-    # Coefficients and state
-    t[:] = table[:LOCAL].ravel()
+    t = aligned_line(table, LOCAL, LANES)
     for first in range(0, acceleration.size - 1, TILE):
         tile = first // TILE
         for lane in range(LANES):
@@ -246,33 +244,20 @@ def _mark_lanes(checkpoints, tile, peak, jump, push, limits, marks):
 def _run_steps(acceleration, first, g):
     """Run a group over the samples of one tile: state, squared radius, coefficients of a step."""
     for i in range(first, first + TILE, 4):
-        # Samples of four steps
-        p0, p1, p2 = acceleration[i], acceleration[i + 1], acceleration[i + 2]
-        p3, p4 = acceleration[i + 3], acceleration[i + 4]
-        for k in range(TOGETHER):
-            u0, z0 = g[k], g[TOGETHER + k]
-            a11, a12, a21, a22 = (
-                g[3 * TOGETHER + k],
-                g[4 * TOGETHER + k],
-                g[5 * TOGETHER + k],
-                g[6 * TOGETHER + k],
-            )
-            b11, b12, b21 = g[7 * TOGETHER + k], g[8 * TOGETHER + k], g[9 * TOGETHER + k]
-            b22 = g[10 * TOGETHER + k]
-            # First step (Nigam & Jennings)
-            u1 = a11 * u0 + (a12 * z0 + (b11 * p0 + b12 * p1))
-            z1 = a21 * u0 + (a22 * z0 + (b21 * p0 + b22 * p1))
-            # Second step
-            u2 = a11 * u1 + (a12 * z1 + (b11 * p1 + b12 * p2))
-            z2 = a21 * u1 + (a22 * z1 + (b21 * p1 + b22 * p2))
-            # Third step
-            u3 = a11 * u2 + (a12 * z2 + (b11 * p2 + b12 * p3))
-            z3 = a21 * u2 + (a22 * z2 + (b21 * p2 + b22 * p3))
-            # Fourth step
-            u4 = a11 * u3 + (a12 * z3 + (b11 * p3 + b12 * p4))
-            z4 = a21 * u3 + (a22 * z3 + (b21 * p3 + b22 * p4))
-            # Largest squared radius
-            early = max(u1 * u1 + z1 * z1, u2 * u2 + z2 * z2)
-            late = max(u3 * u3 + z3 * z3, u4 * u4 + z4 * z4)
-            g[k], g[TOGETHER + k] = u4, z4
-            g[2 * TOGETHER + k] = max(g[2 * TOGETHER + k], early, late)
+        for lane in range(TOGETHER):
+            # State, largest squared radius, and the coefficients of a step
+            u, z, square = g[lane], g[TOGETHER + lane], g[2 * TOGETHER + lane]
+            a11, a12 = g[3 * TOGETHER + lane], g[4 * TOGETHER + lane]
+            a21, a22 = g[5 * TOGETHER + lane], g[6 * TOGETHER + lane]
+            b11, b12 = g[7 * TOGETHER + lane], g[8 * TOGETHER + lane]
+            b21, b22 = g[9 * TOGETHER + lane], g[10 * TOGETHER + lane]
+            # Four steps (Nigam & Jennings)
+            for k in range(i, i + 4):
+                start, end = acceleration[k], acceleration[k + 1]
+                u, z = (
+                    a11 * u + (a12 * z + (b11 * start + b12 * end)),
+                    a21 * u + (a22 * z + (b21 * start + b22 * end)),
+                )
+                square = max(square, u * u + z * z)
+            # State for the next four
+            g[lane], g[TOGETHER + lane], g[2 * TOGETHER + lane] = u, z, square

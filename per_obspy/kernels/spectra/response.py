@@ -8,12 +8,19 @@ then ``u + 2 xi z``.
 
 import math
 
+from per_obspy.kernels._aligned import aligned_line, store_line
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients, unit_responses
 from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE
 
-#: Rows of packed oscillators: state (2), input, two weights, twice the damping, eight coefficients.
-ROWS = 14
+#: Rows of packed oscillators: state (0, 1) and input, weights of both components, twice the
+#: damping, the eight coefficients of a step, and the largest squared radius, displacement, velocity
+#: and absolute acceleration of a tile.
+STEP, EXTREMES, ROWS = 6, 14, 18
+#: Where each begins in one line of memory.
+U, Z, P, NORTH, EAST, VISCOSITY = (row * LANES for row in range(STEP))
+A11, A12, A21, A22, B11, B12, B21, B22 = (row * LANES for row in range(STEP, EXTREMES))
+SQUARE, DISPLACEMENT, VELOCITY, ABSOLUTE = (row * LANES for row in range(EXTREMES, ROWS))
 
 
 @kernel
@@ -28,41 +35,31 @@ def pack_response(weights, phases, dampings, packed):
     phases, dampings : (LANES,) ndarray
         Phase ``omega * dt`` of a step, rad; fraction of critical.
     packed : (ROWS, LANES) ndarray
-        Receives state ``u, z`` and acceleration (zero), both weights, twice the damping, and the
-        eight coefficients of a step.
+        Receives all rows.
     """
+    packed[:] = 0.0
     for lane in range(LANES):
-        packed[0, lane] = 0.0
-        packed[1, lane] = 0.0
-        packed[2, lane] = 0.0
-        packed[3, lane] = weights[0, lane]
-        packed[4, lane] = weights[1, lane]
+        packed[3, lane], packed[4, lane] = weights[0, lane], weights[1, lane]
         packed[5, lane] = 2.0 * dampings[lane]
         # Coefficients of a step (Nigam & Jennings)
         coefficients = step_coefficients(1.0, dampings[lane], phases[lane])
-        for row, coefficient in enumerate(coefficients):
-            packed[6 + row, lane] = coefficient
+        for row in range(8):
+            packed[STEP + row, lane] = coefficients[row]
 
 
 @kernel
-def _open_tile(u, z, viscosity, square, displacement, velocity, absolute, checkpoint):
+def _open_tile(north, east, t, checkpoint):
     """Store the states before a tile and start its largest values with theirs."""
     for lane in range(LANES):
         # Denormal states become zero
-        u[lane] = u[lane] if abs(u[lane]) > SMALLEST_STATE else 0.0
-        z[lane] = z[lane] if abs(z[lane]) > SMALLEST_STATE else 0.0
-        checkpoint[0, lane], checkpoint[1, lane] = u[lane], z[lane]
-        square[lane] = u[lane] * u[lane] + z[lane] * z[lane]
-        displacement[lane], velocity[lane] = abs(u[lane]), abs(z[lane])
-        absolute[lane] = abs(u[lane] + viscosity[lane] * z[lane])
-
-
-@kernel
-def _close_tile(square, displacement, velocity, absolute, checkpoint):
-    """Store the largest values of a tile."""
-    for lane in range(LANES):
-        checkpoint[2, lane], checkpoint[3, lane] = square[lane], displacement[lane]
-        checkpoint[4, lane], checkpoint[5, lane] = velocity[lane], absolute[lane]
+        u = t[U + lane] if abs(t[U + lane]) > SMALLEST_STATE else 0.0
+        z = t[Z + lane] if abs(t[Z + lane]) > SMALLEST_STATE else 0.0
+        t[U + lane], t[Z + lane] = u, z
+        t[P + lane] = t[NORTH + lane] * north + t[EAST + lane] * east
+        # Checkpoint and first values
+        checkpoint[0, lane], checkpoint[1, lane] = u, z
+        t[SQUARE + lane], t[DISPLACEMENT + lane] = u * u + z * z, abs(u)
+        t[VELOCITY + lane], t[ABSOLUTE + lane] = abs(z), abs(u + t[VISCOSITY + lane] * z)
 
 
 @kernel
@@ -75,71 +72,46 @@ def run_response_tiles(north, east, packed, checkpoints):
     north, east : (tiles * TILE + 1,) ndarray
         Components of the ground acceleration, scaled to a peak of order one.
     packed : (ROWS, LANES) ndarray
-        Rows from `pack_response`; the state in the first three is advanced to the last sample.
+        Rows from `pack_response`; the state in the first two is advanced to the last sample.
     checkpoints : (TILES, 6, LANES) ndarray
         Receives, per tile, the state ``u, z`` before it (2 rows) and the largest ``u² + z²``,
         ``|u|``, ``|z|`` and ``|u + 2 xi z|`` at its samples, in the unit of the acceleration (over
         ``omega²``) or its square.
     """
-    # Local copies of a size that the compiler knows: it makes vectors
-    u, z, p = packed[0].copy(), packed[1].copy(), packed[2].copy()
-    square, displacement = packed[3].copy(), packed[3].copy()
-    velocity, absolute = packed[3].copy(), packed[3].copy()
-    to_north, to_east, viscosity = packed[3].copy(), packed[4].copy(), packed[5].copy()
-    # Coefficients of a step
-    a11, a12, a21, a22 = packed[6].copy(), packed[7].copy(), packed[8].copy(), packed[9].copy()
-    b11, b12, b21, b22 = packed[10].copy(), packed[11].copy(), packed[12].copy(), packed[13].copy()
+    # Of a size and with places that the compiler knows: it makes vectors
+    t = aligned_line(packed, ROWS, LANES)
     for first in range(0, north.size - 1, TILE):
-        # Start of a tile, with the acceleration along each azimuth at its first sample
-        for lane in range(LANES):
-            p[lane] = to_north[lane] * north[first] + to_east[lane] * east[first]
-        _open_tile(
-            u, z, viscosity, square, displacement, velocity, absolute, checkpoints[first // TILE]
-        )
-        for i in range(first + 1, first + TILE + 1, 4):
-            # Samples of four steps, of both components
-            north_1, north_2, north_3, north_4 = north[i], north[i + 1], north[i + 2], north[i + 3]
-            east_1, east_2, east_3, east_4 = east[i], east[i + 1], east[i + 2], east[i + 3]
+        tile = first // TILE
+        _open_tile(north[first], east[first], t, checkpoints[tile])
+        for i in range(first, first + TILE, 4):
             for lane in range(LANES):
-                # Acceleration along the azimuth
-                u0, z0, p0 = u[lane], z[lane], p[lane]
-                p1 = to_north[lane] * north_1 + to_east[lane] * east_1
-                p2 = to_north[lane] * north_2 + to_east[lane] * east_2
-                p3 = to_north[lane] * north_3 + to_east[lane] * east_3
-                p4 = to_north[lane] * north_4 + to_east[lane] * east_4
-                # First step (Nigam & Jennings)
-                u1 = a11[lane] * u0 + (a12[lane] * z0 + (b11[lane] * p0 + b12[lane] * p1))
-                z1 = a21[lane] * u0 + (a22[lane] * z0 + (b21[lane] * p0 + b22[lane] * p1))
-                # Second step
-                u2 = a11[lane] * u1 + (a12[lane] * z1 + (b11[lane] * p1 + b12[lane] * p2))
-                z2 = a21[lane] * u1 + (a22[lane] * z1 + (b21[lane] * p1 + b22[lane] * p2))
-                # Third step
-                u3 = a11[lane] * u2 + (a12[lane] * z2 + (b11[lane] * p2 + b12[lane] * p3))
-                z3 = a21[lane] * u2 + (a22[lane] * z2 + (b21[lane] * p2 + b22[lane] * p3))
-                # Fourth step
-                u4 = a11[lane] * u3 + (a12[lane] * z3 + (b11[lane] * p3 + b12[lane] * p4))
-                z4 = a21[lane] * u3 + (a22[lane] * z3 + (b21[lane] * p3 + b22[lane] * p4))
-                u[lane], z[lane], p[lane] = u4, z4, p4
-                # Largest squared radius
-                early = max(u1 * u1 + z1 * z1, u2 * u2 + z2 * z2)
-                late = max(u3 * u3 + z3 * z3, u4 * u4 + z4 * z4)
-                square[lane] = max(square[lane], early, late)
-                # Largest displacement
-                early = max(abs(u1), abs(u2))
-                late = max(abs(u3), abs(u4))
-                displacement[lane] = max(displacement[lane], early, late)
-                # Largest velocity
-                early = max(abs(z1), abs(z2))
-                late = max(abs(z3), abs(z4))
-                velocity[lane] = max(velocity[lane], early, late)
-                # Largest absolute acceleration
-                early = max(abs(u1 + viscosity[lane] * z1), abs(u2 + viscosity[lane] * z2))
-                late = max(abs(u3 + viscosity[lane] * z3), abs(u4 + viscosity[lane] * z4))
-                absolute[lane] = max(absolute[lane], early, late)
-        _close_tile(square, displacement, velocity, absolute, checkpoints[first // TILE])
+                # State before four steps, and the largest values so far
+                u, z, p, viscosity = t[U + lane], t[Z + lane], t[P + lane], t[VISCOSITY + lane]
+                square, displacement = t[SQUARE + lane], t[DISPLACEMENT + lane]
+                velocity, absolute = t[VELOCITY + lane], t[ABSOLUTE + lane]
+                for k in range(1, 5):
+                    # One step (Nigam & Jennings) under the acceleration along the azimuth
+                    start = p
+                    p = t[NORTH + lane] * north[i + k] + t[EAST + lane] * east[i + k]
+                    f = t[B11 + lane] * start + t[B12 + lane] * p
+                    g = t[B21 + lane] * start + t[B22 + lane] * p
+                    u, z = (
+                        t[A11 + lane] * u + (t[A12 + lane] * z + f),
+                        t[A21 + lane] * u + (t[A22 + lane] * z + g),
+                    )
+                    # Largest values
+                    square, displacement = max(square, u * u + z * z), max(displacement, abs(u))
+                    velocity = max(velocity, abs(z))
+                    absolute = max(absolute, abs(u + viscosity * z))
+                t[U + lane], t[Z + lane], t[P + lane] = u, z, p
+                t[SQUARE + lane], t[DISPLACEMENT + lane] = square, displacement
+                t[VELOCITY + lane], t[ABSOLUTE + lane] = velocity, absolute
+        # Largest values of the tile
+        for row in range(4):
+            for lane in range(LANES):
+                checkpoints[tile, 2 + row, lane] = t[(EXTREMES + row) * LANES + lane]
     # State for the next stretch of the record
-    for lane in range(LANES):
-        packed[0, lane], packed[1, lane], packed[2, lane] = u[lane], z[lane], p[lane]
+    store_line(t, packed, 2)
 
 
 @kernel

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from per_obspy.kernels.maxima.strided_samples import (
+from per_obspy.kernels.maxima.window import FORGOTTEN, find_windows
+from per_obspy.kernels.oscillator.strides import (
     MAXIMA_LANES,
     OSCILLATOR_ROWS,
     pack_oscillator,
 )
-from per_obspy.kernels.maxima.window import FORGOTTEN, find_windows
 
 LANES = np.arange(MAXIMA_LANES)
 PHASES = np.geomspace(1e-3, 8.0, MAXIMA_LANES)

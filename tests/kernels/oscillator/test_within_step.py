@@ -36,9 +36,8 @@ def test_no_root_is_missed(roots):
 
 def _largest(u, z, start, end, damping, phase):
     largest = np.zeros(4)
-    selected = np.ones(4, dtype=bool)
     within_step.largest_in_step(
-        u, z, start, end, damping, phase, selected, within_step.workspace(), largest
+        u, z, start, end, damping, phase, 15, within_step.workspace(), largest
     )
     return largest
 
@@ -77,9 +76,9 @@ def test_largest_values_of_a_step(case):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_conditions_that_are_not_selected_cannot_matter(seed):
-    # catches bounds that are too small: values between the samples never exceed the largest unless
-    # marked
+def test_a_larger_value_is_found_whatever_the_others_are(seed):
+    # catches bounds that are too small: a condition that is not looked at, or values between the
+    # samples that exceed them
     random = np.random.default_rng(seed)
     u, z, start, end = random.normal(size=4)
     damping, phase = random.uniform(0, 0.9), random.uniform(0.05, 3.0)
@@ -106,13 +105,48 @@ def test_conditions_that_are_not_selected_cannot_matter(seed):
         within_step.step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase)
         >= dense[2]
     )
-    known = np.full(4, np.inf)
+    ends_of_step, work = (u, z, start, u_end, z_end, end), within_step.workspace()
     for row in range(4):
-        known[row] = dense[row] * (1 - 1e-6)
-        selected = np.zeros(4, dtype=bool)
-        within_step.select_conditions(
-            u, z, start, u_end, z_end, end, damping, phase, radius, 4, known, selected
-        )
-        if ends[:, row].max() < known[row]:
-            assert selected.any()
-        known[row] = np.inf
+        # the others do not count, or are far below
+        for others in (np.inf, 0.0):
+            known = np.full(4, others)
+            known[row] = dense[row] * (1 - 1e-6)
+            terms = within_step.series_terms(phase)
+            within_step.raise_in_step(ends_of_step, radius, damping, phase, terms, work, known)
+            assert max(known[row], ends[:, row].max()) >= dense[row] * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.7])
+def test_a_root_gives_the_value_of_a_search(damping):
+    # mutations: a sign of the correction, the slope of another condition, a step with two roots
+    # called certain
+    random, roots = np.random.default_rng(8), np.zeros(4)
+    for phase in (0.01, 0.1, 0.45):
+        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(1.0, damping, phase)
+        terms, work = within_step.series_terms(phase), within_step.workspace()
+        for u, z, start, end in random.normal(size=(60, 4)) * [1.0, phase, 1.0, 1.0]:
+            u_end = a11 * u + a12 * z + b11 * start + b12 * end
+            z_end = a21 * u + a22 * z + b21 * start + b22 * end
+            peak, jump = max(abs(start), abs(end)), abs(end - start)
+            rates = within_step.rate_bounds(
+                np.hypot(u, z) + phase * 4.0, peak, jump, damping, phase
+            )
+            # the values at both ends, which the search includes
+            at_ends = [
+                (x * x + w * w, abs(x), abs(w), abs(x + 2 * damping * w))
+                for x, w in ((u, z), (u_end, z_end))
+            ]
+            for number in range(4):
+                best, expected = np.zeros(4), np.max(at_ends, axis=0)
+                within_step.largest_in_step(
+                    u, z, start, end, damping, phase, 1 << number, work, expected
+                )
+                ends = u, z, start, u_end, z_end, end
+                if within_step.raise_to_root(
+                    number, ends, rates, damping, phase, terms, work, best
+                ):
+                    roots[number] += best.any()
+                    ours = max(best[number], np.max(at_ends, axis=0)[number])
+                    # 1e-15 of a shift's third power, and rounding
+                    assert_allclose(ours, expected[number], rtol=1e-13)
+    assert roots.min() > (15 if damping else 0)

@@ -13,9 +13,8 @@ from per_obspy.kernels.spectra.tile_search import LANES
 
 def _alone(problem, phase, damping):
     """Return the largest squared radius and displacement in one step."""
-    largest, selected = np.zeros(4), np.array([True, True, False, False])
-    work = within_step.workspace()
-    within_step.largest_in_step(*problem, damping, phase, selected, work, largest)
+    largest = np.zeros(4)
+    within_step.largest_in_step(*problem, damping, phase, 3, within_step.workspace(), largest)
     return largest[0], largest[1] ** 2
 
 

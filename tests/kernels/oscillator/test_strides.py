@@ -1,14 +1,18 @@
 """Blocks of oscillators looked at every 1, 2 or 4 steps, so short that they also run uncompiled."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.maxima.strided_samples import (
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.oscillator.strides import (
     CHECKPOINT_ROWS,
     MAXIMA_LANES,
     OSCILLATOR_ROWS,
     SQUARE,
+    fill_stride_weights,
     pack_oscillator,
     run_strides,
 )
@@ -59,3 +63,23 @@ def test_each_oscillator_is_at_rest_before_its_own_start(plain_states):
     for lane, first in ((6, TILE), (7, 0)):
         states = plain_states(_along(lane)[first:], PHASES[lane], DAMPINGS[lane])
         assert_allclose(table[:2, lane], states[-1], atol=1e-12 * np.abs(states).max())
+
+
+@pytest.mark.parametrize("stride", [1, 2, 4, 8])
+def test_a_stride_is_as_many_steps(stride):
+    # mutations: a weight that is moved on once too often, a sample that counts once where two
+    # steps share it
+    phase, damping = 0.4, 0.1
+    step = step_coefficients(1.0, damping, phase)
+    displaced, moved = np.zeros((2, stride + 1))
+    fill_stride_weights(step, stride, displaced, moved)
+    samples = np.random.default_rng(stride).normal(size=stride + 1)
+    u, z = state = 0.3, -0.7
+    a11, a12, a21, a22, b11, b12, b21, b22 = step
+    for start, end in pairwise(samples):
+        u, z = (
+            a11 * u + a12 * z + b11 * start + b12 * end,
+            a21 * u + a22 * z + b21 * start + b22 * end,
+        )
+    matrix = np.reshape(step_coefficients(1.0, damping, stride * phase)[:4], (2, 2))
+    assert_allclose(matrix @ state + [displaced @ samples, moved @ samples], [u, z], rtol=1e-13)
