@@ -164,3 +164,24 @@ def test_only_one_trace_of_acceleration_can_be_written(tmp_path: Path):
     trace.stats.units = "counts"
     with pytest.raises(ValueError, match="got 'counts'"):
         write_at2(obspy.Stream([trace]), tmp_path / "raw.AT2")
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["DT= .0050 SEC, 5 POLE @ 30.00000 HZ, -5 POLE @ .08000 HZ", "DT= .0050 SEC, -5 POLE @ .08000"],
+)
+def test_the_corner_of_the_header_sets_the_longest_usable_period(words: str):
+    # A pulse of 0.9 m/s with a drifting displacement, as near a fault: from the drift alone it
+    # would end early
+    times = 0.005 * np.arange(3000)
+    samples = np.where(np.abs(times - 3) < 1, np.sin(np.pi * (times - 2)) + 0.3, 0.0)
+    header = [*NAMED.split("\n")[:3], f"NPTS= {times.size}, {words}"]
+    body = [f"{0.1 * value:.7E}" for value in samples]
+    stream = obspy.Stream([read("\n".join(header + body))])
+    settings = Processing()
+    # 0.8 / HP (Boore and others): 10 s
+    longest = pass_through(stream[0], settings).stats.per_obspy.longest_period
+    assert_allclose(longest, 10.0, rtol=1e-12)
+    # Without it the displacement decides
+    del stream[0].stats.corners["highpass"]
+    assert pass_through(stream[0], settings).stats.per_obspy.longest_period < 5.0

@@ -437,3 +437,19 @@ def test_ground_in_the_header_is_read_and_unknown_words_are_none(name, lines, gr
     (trace,) = read(sample, sample.text.replace("DATE_TIME_FIRST", f"{lines}DATE_TIME_FIRST", 1))
     found = {word: trace.stats[word] for word in ("vs30", "site_class") if word in trace.stats}
     assert found == ground
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("usc_v1", "34 06 36N, 118 22 48W", "34 06 36N, 118 72 48W"),
+        ("dyna", "STATION_LATITUDE_DEGREE: 37.6349", "STATION_LATITUDE_DEGREE: 376349"),
+        ("smc", "3.7728000E+01", "3.7728000E+04"),
+    ],
+)
+def test_a_place_out_of_range_is_unknown_and_noted(name: str, old: str, new: str):
+    sample = SAMPLES[name]
+    assert old in sample.text
+    for trace in read(sample, sample.text.replace(old, new)):
+        assert "coordinates" not in trace.stats
+        assert trace.stats.processing[-1].endswith("out of range, so the place is unknown")

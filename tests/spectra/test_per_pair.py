@@ -18,8 +18,8 @@ def one_component(record, dt, periods, dampings):
     return azimuth_maxima(record, np.zeros(len(record)), dt, periods, dampings, 0.0)
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.05, 0.99])
-@pytest.mark.parametrize("ratio", [0.3, 5.0, 20.0, 5000.0])
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.3, 0.99])
+@pytest.mark.parametrize("ratio", [0.3, 5.0, 20.0, 70.0, 5000.0])
 def test_agrees_with_matrix_exponentials(noise, reference, ratio, damping):
     # mutations: a sample's weight in a stride, a stationary point, the closing ramp or the free
     # vibration left out
