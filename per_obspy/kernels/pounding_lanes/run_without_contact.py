@@ -19,4 +19,4 @@ def run_without_contact(*arguments: Any) -> bool:
     line and ``u1 - u2`` in the second (m), LARGEST_DISPLACEMENT (m) and LARGEST_RADIUS_SQUARED
     (m²). Return whether all pairs got through.
     """
-    return run_block(*arguments, APART)
+    return run_block(*arguments, kind=APART)
