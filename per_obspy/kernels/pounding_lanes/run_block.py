@@ -105,7 +105,7 @@ def _flags_of(kind, flags, firsts, number):
     return together
 
 
-@lean
+@inlined
 def _treat(kind, lanes, flags, together, memory, firsts, number, record, grounds, step, count):
     """Treat a row with such flags in all after the sweep; return whether it got through."""
     place, stride, own, row, log, deferred, rooms = _row_of(kind, memory, firsts, number)
@@ -298,6 +298,7 @@ def run_block(
     cosine: Floats,
     sine: Floats,
     free_steps: Integers,
+    *,
     kind: int = PAIRS,
 ) -> bool:
     """
