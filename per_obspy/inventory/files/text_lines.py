@@ -137,6 +137,7 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     encodings = possible_encodings(file, given.encoding)
     forms = list(_possible_forms(file, given, list(encodings)))
     if not forms:
+        check_text(file)  # names the line that is not UTF-8
         raise CatalogError(str(file), "line 1: no header can be read")
     best = max(forms, key=_rank)
     if len(best.meanings.columns) < _FEWEST:

@@ -246,3 +246,10 @@ def test_no_line_of_random_text_is_lost(read, monkeypatch):
             assert [row for row in found if row.startswith("good")] == [
                 f"good{i},1,x" for i in range(6)
             ]
+
+
+def test_a_text_that_only_japanese_bytes_allow_names_the_line_that_is_not_utf_8(write):
+    # 0x93 0xfa is a letter of cp932 that no heading asks for, beside one of UTF-8
+    content = plain().content + "é".encode() + b"\x93\xfa\n"
+    with pytest.raises(CatalogError, match=r"line 5 is not UTF-8 \(byte 0x93 at position 3\)"):
+        read_pairs(write(content))
