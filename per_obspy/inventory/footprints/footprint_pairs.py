@@ -7,7 +7,6 @@ file that goes with the pairs, which refer to it by ``building_id_1`` and ``buil
 
 import json
 from collections.abc import Mapping
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -332,12 +331,16 @@ def without_repetitions(
 
 def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
     """Return where an outline repeats an earlier one, whatever the order of its points."""
-    digests = list[bytes]()
+    hashes = [np.empty(0, dtype=np.uint64)]
     for _, shapes in blocks(outlines):
-        # Shorter than the outlines, and never shared by two
-        for wkb in shapely.to_wkb(shapely.normalize(shapes)):
-            digests.append(blake2b(wkb, digest_size=16).digest())
-    return pd.Series(digests, dtype=object).duplicated().to_numpy()
+        normal = shapely.to_wkb(shapely.normalize(shapes))
+        hashes.append(pd.util.hash_array(normal, categorize=False))
+    # A hash may be shared by chance: the outlines themselves decide
+    shared = np.flatnonzero(pd.Series(np.concatenate(hashes)).duplicated(keep=False))
+    shapes = shapely.to_wkb(shapely.normalize(polygons(outlines.take(pa.array(shared)))))
+    repeated = np.zeros(len(outlines), dtype=bool)
+    repeated[shared] = pd.Series(shapes, dtype=object).duplicated()
+    return repeated
 
 
 def projected(buildings: Buildings, source: str) -> tuple[Buildings, Outlines]:
