@@ -33,6 +33,8 @@ SCRIPTS = (
     *("histories", "footprints", "screening"),
 )
 
+#: Feature in ``NUMBA_CPU_FEATURES`` by which the compiler uses full-width vectors.
+FULL_WIDTH = "-prefer-256-bit"
 #: Description of the processors, on Linux.
 PROCESSORS = Path("/proc/cpuinfo")
 
@@ -100,7 +102,7 @@ def machine() -> str:
         if {"cpu family", "model"} <= facts.keys():
             model += f" (family {facts['cpu family']}, model {facts['model']})"
     system = f"{platform.system()}, Python {platform.python_version()}"
-    is_full = "-prefer-256-bit" in os.environ.get("NUMBA_CPU_FEATURES", "")
+    is_full = FULL_WIDTH in os.environ.get("NUMBA_CPU_FEATURES", "")
     vectors = "vectors of full width" if is_full else "width of vectors by the compiler"
     return f"{model}, {vectors}, {os.cpu_count()} processors, {system}"
 
