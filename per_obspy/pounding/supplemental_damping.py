@@ -96,10 +96,8 @@ def supplemental_damping(
     acceleration = checks.record("acceleration", acceleration)
     gap = checks.number("gap", gap, checks.not_negative)
     largest = checks.number("largest", largest, checks.positive)
-    share_1 = checks.number("share_1", share_1, checks.not_negative)
-    share_2 = checks.number("share_2", share_2, checks.not_negative)
-    damping_1 = checks.number("damping_1", damping_1, checks.fraction_of_critical)
-    damping_2 = checks.number("damping_2", damping_2, checks.fraction_of_critical)
+    period_1, damping_1, share_1 = _checked(1, period_1, damping_1, share_1)
+    period_2, damping_2, share_2 = _checked(2, period_2, damping_2, share_2)
     _refuse_critical("damping_1", damping_1 + share_1 * largest)
     _refuse_critical("damping_2", damping_2 + share_2 * largest)
 
@@ -115,6 +113,17 @@ def supplemental_damping(
 
     # Scan the added damping, and refine before the first that is enough
     return _least(critical_gaps, gap, largest)
+
+
+def _checked(
+    number: int, period: float, damping: float, share: float
+) -> tuple[float, float, float]:
+    """Return the checked numbers of structure 1 or 2."""
+    return (
+        checks.number(f"period_{number}", period, checks.positive),
+        checks.number(f"damping_{number}", damping, checks.fraction_of_critical),
+        checks.number(f"share_{number}", share, checks.not_negative),
+    )
 
 
 def _refuse_critical(name: str, damping: float) -> None:
