@@ -84,7 +84,7 @@ LARGEST_DAMPING = 0.99
 
 
 def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
-    """Return the period of building i, (n_pairs, n_nodes), s, from its median."""
+    """Return the lognormal period of building i at the nodes, (n_pairs, n_nodes), s."""
     deviation = values(table, f"period_log_std_{i}")
     period: FloatArray = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 2]))
     return period
