@@ -11,9 +11,9 @@ from per_obspy.screening.warmup import PARTS, compile_part
 #: Stage of the progress.
 COMPILING = "compiling kernels (once, one to two minutes)"
 
-#: Parts that are compiled last: the kernels that only whole tables reach, which call those of the
-#: other parts, and the part that shares the fewest with them.
-LAST = ("screening", "spectra")
+#: Part that is compiled last: the kernels that only whole tables reach, which call those of the
+#: other parts.
+LAST = ("screening",)
 
 
 def compile_kernels(progress: Progress) -> None:

@@ -56,21 +56,14 @@ BOTH = np.stack([PULSE, PULSE])
 
 
 def _histories() -> None:
-    """Compile the kernels of pair histories, and of the single history of the page."""
+    """Compile the kernels of histories of pairs, of rows, and of the single one of the page."""
     oscillators = [0.5], 0.05, 1.0, [0.7], 0.05, 1.0
     pounding_histories(BOTH, INTERVAL, *oscillators, 0.001, 0.65, azimuth=[0.0])
     structures = [Structure(0.5, 0.05, 1.0), Structure(0.7, 0.05, 1.0)]
     pounding_history(PULSE, INTERVAL, structures, 0.001, 0.65, free_vibration=False)
-
-
-def _yielding() -> None:
-    """Compile the kernels of relative displacements of yielding pairs."""
+    # Yielding pairs that never touch
     pair = [0.5], 0.05, [0.7], 0.05, [0.0]
     yielding_relative_displacement(BOTH, INTERVAL, *pair, yield_displacement_1=0.02)
-
-
-def _rows() -> None:
-    """Compile the kernels of histories of rows of buildings."""
     # Three buildings in touch that yield
     ones = np.ones(3)
     period = np.array([0.5, 0.7, 0.6])
@@ -122,10 +115,8 @@ def compile_screening() -> None:
 #: Parts that processes compile next to each other, the longest first; `compile_screening` then
 #: compiles what is left.
 PARTS: dict[str, Callable[[], None]] = {
-    "relative": _relative,
-    "rows": _rows,
-    "yielding": _yielding,
     "histories": _histories,
+    "relative": _relative,
     "spectra": _spectra,
 }
 

@@ -7,7 +7,7 @@ import pytest
 from numba import config
 
 from per_obspy.errors import Unfinished
-from per_obspy.jobs import kernels, worker_start
+from per_obspy.jobs import kernels, parallel, worker_start
 from per_obspy.kernels import _jit
 
 #: A part that compiles one small kernel instead of many large ones.
@@ -34,7 +34,7 @@ def test_all_parts_are_compiled_in_processes(call, tmp_path, monkeypatch):
     monkeypatch.setattr(worker_start, "LOADED", ("per_obspy.kernels._jit",))
     small_part = importlib.import_module("small_part")
     monkeypatch.setattr(kernels, "compile_part", small_part.compile_part)
-    monkeypatch.setattr(kernels, "usable_processors", lambda: 2)
+    monkeypatch.setattr(parallel, "usable_processors", lambda: 2)
     code, out, err = call("warm-up")
     assert code == 0
     assert out == "all kernels are compiled\n"
@@ -55,13 +55,13 @@ def test_all_parts_are_compiled_in_processes(call, tmp_path, monkeypatch):
 def test_a_part_that_fails_is_named(monkeypatch):
     # catches a warm-up that claims success although a later run would have to compile
     def fails(name):
-        if name == "rows":
+        if name == "histories":
             raise ValueError("no room")
         return name
 
     monkeypatch.setattr(kernels, "compile_part", fails)
-    monkeypatch.setattr(kernels, "usable_processors", lambda: 1)
-    with pytest.raises(Unfinished, match=r"rows cannot be compiled: .*no room"):
+    monkeypatch.setattr(parallel, "usable_processors", lambda: 1)
+    with pytest.raises(Unfinished, match=r"histories cannot be compiled: .*no room"):
         kernels.compile_kernels(lambda *_: None)
 
 
