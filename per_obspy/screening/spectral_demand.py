@@ -3,7 +3,7 @@ Demand and population of pairs by the spectral displacement of both buildings, w
 
 These are rungs 2 and 3 of the ladder of demands. There is no PER in a spectrum: the radius is the
 spectral displacement, because the gap from it and eq. (16) is the one that is known to be closest
-to the exact one (see ``SD_MEDIAN`` in ``uncertainty/estimated.py``).
+to the exact one (see ``SD_MEDIAN`` in ``population.py``).
 """
 
 from collections.abc import Mapping, Sequence

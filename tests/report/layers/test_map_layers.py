@@ -23,7 +23,7 @@ from pyarrow import parquet
 
 from per_obspy.report.layers.geopackage import layer_names
 from per_obspy.report.layers.map_layers import MapSources, write_layers
-from per_obspy.screening.totals import box_outlines, grid_cells, totals
+from per_obspy.screening.totals import box_outlines, grid_cells, joined_totals, partial_totals
 from per_obspy.tables.totals import RegionTotals
 
 CLASSES = ("severe", "high", "low")
@@ -52,6 +52,11 @@ TABLE = pd.DataFrame(
 STATIONS = pd.DataFrame(
     {"station": ["XX.A"], "state": ["used"], "longitude": [-99.15], "latitude": [19.45]}
 )
+
+
+def totals(table, area):
+    """Return the pairs of every area."""
+    return joined_totals([partial_totals(table, area, table["risk_class"].unique())])
 
 
 @pytest.fixture
