@@ -83,7 +83,7 @@ def test_momentum_and_energy_close_at_every_impact(gap):
 def test_a_step_without_end_is_an_error(size):
     # catches: maxima of a history that stopped
     start, firsts = rows_at_rest([size], 0.001, seed=4)
-    start[:, columns.BOUNCE_LIMIT] = 0.0
+    start[:, columns.BOUNCE_LIMIT] = -1e6  # no event is allowed
     record = records_in_steps(np.stack([np.sin(np.arange(60.0)), np.zeros(60)]), [1], 0.02)[1]
     none = np.zeros(1, dtype=np.int64)
     with pytest.raises(RuntimeError, match="no end of events"):
