@@ -1,8 +1,8 @@
 """
 Outcome of pairs over their nodes: chance of contact, impact velocity and amplification.
 
-The formulas and their constants are explained in ``screening/population.py``. The nodes of a pair share one row, so that loops without branches over them
-become vectors.
+The formulas and their constants are explained in ``screening/population.py``. The nodes of a pair
+share one row, so that loops without branches over them become vectors.
 """
 
 import math
