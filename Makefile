@@ -22,12 +22,12 @@ figures: .venv/run
 test: .venv/test
 	@echo "== tests and doctests; make test-long and make workflows have the rest"
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not long" --ignore tests/workflows/test_snakefile.py
+	@echo "== the kernels' tests once more without the compiler"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist worksteal tests/kernels
 
 test-long: .venv/test
 	@echo "== damaged copies of every format, killed runs and watchers, whole earthquakes, the blocks of README and docs"
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m long --ignore tests/workflows/test_snakefile.py tests
-	@echo "== the kernels' tests once more without the compiler"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist worksteal tests/kernels
 
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"
