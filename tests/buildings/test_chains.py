@@ -179,3 +179,15 @@ def test_of_a_ring_only_one_gap_is_cut():
     assert ["b04", "b05"] in list(map(sorted, rows))
     assert sorted(map(len, rows))[0] == 2
     assert max(map(len, rows)) == 5
+
+
+def test_a_ring_around_a_square_is_cut_at_its_widest_gap():
+    # twelve buildings, each turned by 30 degrees against the one before
+    count = 12
+    gaps = np.where(np.arange(count) == 7, 0.5, 0.1)
+    pairs = [(f"b{k:02}", f"b{(k + 1) % count:02}", 30.0 * k, gaps[k]) for k in range(count)]
+    rows, flags, _ = rows_of(street(*pairs), angle=40.0)
+    assert ["b07", "b08"] in rows or ["b08", "b07"] in rows
+    # the rest turns by 300 degrees, and a row by 40 at most
+    assert all(len(row) <= 3 for row in rows)
+    assert all("ring" in found for found in flags)

@@ -7,7 +7,7 @@ A row of two is the pair; mirrored rows; effect of neighbours.
 import numpy as np
 import pytest
 
-from per_obspy.buildings.histories import OUTCOMES, members_of, row_outcomes
+from per_obspy.buildings.histories import OUTCOMES, members_of, no_outcomes, row_outcomes
 from per_obspy.pounding.pair_histories import pounding_histories
 
 from .terraces import contacts, motion, turned
@@ -170,3 +170,14 @@ def test_a_yield_displacement_of_one_pair_is_that_of_the_building():
     found = members(table)
     assert found.rows.yield_displacement.tolist() == [np.inf, 0.02, np.inf]
     assert found.reconciled.all()
+
+
+def test_without_a_history_everything_is_empty():
+    empty = no_outcomes(2)
+    assert set(empty) == set(OUTCOMES)
+    assert all(np.isnan(empty[name]).all() for name in OUTCOMES if name != "reconciled")
+
+
+def test_a_negative_gap_is_refused():
+    with pytest.raises(ValueError, match="gap"):
+        outcomes(contacts(2, gap=np.array([0.0, -0.1])))

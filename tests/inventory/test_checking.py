@@ -6,7 +6,7 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.checking import check_columns, checked_pairs
-from per_obspy.inventory.schema import COLUMNS, ONE_OF, SYSTEMS
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF, SYSTEMS
 
 
 def _row(**changes):
@@ -247,3 +247,17 @@ def test_names_of_columns_that_no_file_should_have(name, problem):
     with pytest.raises(CatalogError, match=problem) as error:
         check_columns(names, "table")
     assert "\n" not in str(error.value)
+
+
+def test_good_rows_survive_bad_ones():
+    table = pd.DataFrame([_row(pair_id=str(i), gap=-1.0 if i % 3 == 0 else 0.1) for i in range(9)])
+    pairs = checked_pairs(table, "pairs.csv")
+    assert pairs["pair_id"].tolist() == ["1", "2", "4", "5", "7", "8"]
+    assert pairs.index.tolist() == list(range(6))
+
+
+def test_every_column_has_a_unit_and_a_meaning():
+    for column in (*COLUMNS.values(), *COMPLETED.values()):
+        assert column.meaning
+        assert bool(column.unit) == (column.dtype == "float64")
+        assert column.low <= column.high

@@ -74,3 +74,37 @@ def test_ground_is_no_floor_to_hit():
 
 def test_misaligned_beyond_the_tolerance_in_either_direction():
     assert floors_misaligned([0.6, -0.62, 0.62], 0.61).tolist() == [False, True, True]
+
+
+def test_one_storey_is_an_oscillator():
+    assert contact_participation(1, 3.0, 3.0) == 1.0
+    assert contact_mass(2e5, 1, 3.0, 3.0) == 2e5
+
+
+def test_effective_mass_of_equal_storeys_is_a_little_larger():
+    # the assumption of a linear shape errs by 14 % at most: 8 / pi² in the limit of a uniform beam
+    for storeys in (1, 3, 10):
+        _, mode = _first_mode(np.ones(storeys))
+        effective = mode.sum() ** 2 / (mode @ mode) / storeys
+        assert 1.0 <= effective / effective_mass_ratio(storeys) < 1.14
+
+
+def test_effective_mass_falls_from_one_to_three_quarters():
+    ratio = effective_mass_ratio([1, 2, 5, 50, 1e9])
+    assert ratio[0] == 1.0
+    assert np.all(np.diff(ratio) < 0.0)
+    assert_allclose(ratio[-1], 0.75, rtol=1e-8)  # limit, off by 1/(2N)
+
+
+@pytest.mark.parametrize("level", [0.1, 0.6, 1.0])
+def test_energy_does_not_depend_on_where_it_is_seen(level):
+    # kinetic energy of an oscillator of velocity 1: m*_c q**2 / 2 is the same at every level, that
+    # of the mode itself
+    storeys, height = 6, 18.0
+    seen = (
+        contact_mass(9e5, storeys, height, level * height)
+        * contact_participation(storeys, height, level * height) ** 2
+    )
+    floor = np.arange(1, storeys + 1) / storeys
+    mode = 9e5 / storeys * (floor.sum() ** 2) / (floor**2).sum()
+    assert_allclose(seen, mode, rtol=1e-13)

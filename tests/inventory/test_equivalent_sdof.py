@@ -86,3 +86,9 @@ def test_the_first_mode_carries_most_of_the_roof():
     # white noise excites all modes
     assert np.abs(first - roof).max() < 0.35 * np.abs(roof).max()
     assert np.corrcoef(first, roof)[0, 1] > 0.9
+
+
+def test_one_floor_is_its_oscillator():
+    period = 2 * np.pi * np.sqrt(1e5 / 1e7)
+    floor = modal_history(np.array([1e5]), np.array([1e7]))[0]
+    assert_allclose(floor, oscillator_displacement(period), rtol=1e-12)

@@ -65,3 +65,12 @@ def test_unknown_system_is_named(formula):
 
 def test_walls_and_unknown_systems_scatter_more():
     assert_array_equal(period_log_std(SYSTEMS), [0.3, 0.3, 0.4, 0.4, 0.3, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("system", "lower"), [("steel_mrf", (0.0724, 0.8)), ("concrete_mrf", (0.0466, 0.9))]
+)
+def test_medians_lie_above_the_lower_bound_of_the_code(system, lower):
+    # would catch the best-fit ratio forgotten or divided by
+    height = np.array([5.0, 50.0])
+    assert (asce7_period(height, system) > 1.1 * lower[0] * height ** lower[1]).all()

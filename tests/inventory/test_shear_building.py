@@ -102,3 +102,19 @@ def test_inputs_stay():
     shear_building(masses, stiffnesses)
     assert (masses == before[0]).all()
     assert (stiffnesses == before[1]).all()
+
+
+def test_one_storey_is_the_oscillator_itself():
+    found = equivalent_sdof([2e5], [8e6], 0)
+    assert_allclose(found, [2 * np.pi / np.sqrt(40.0), 1.0, 2e5], rtol=1e-14)
+
+
+def test_static_deflection_bounds_the_period_from_above():
+    # Rayleigh's quotient of any other shape is above the lowest frequency squared
+    masses, stiffnesses = _random_building(7)
+    storeys_below = np.cumsum(np.cumsum(masses[::-1])[::-1] / stiffnesses)
+    trial = np.diff(storeys_below, prepend=0.0)
+    rayleigh = (stiffnesses @ trial**2) / (masses @ storeys_below**2)
+    period = shear_building(masses, stiffnesses).periods[0]
+    assert 2 * np.pi / np.sqrt(rayleigh) <= period * (1 + 1e-12)
+    assert 2 * np.pi / np.sqrt(rayleigh) > 0.95 * period  # and it is a good shape

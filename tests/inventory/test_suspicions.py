@@ -512,3 +512,8 @@ def test_surveyed_towns_raise_no_suspicion(real_data, town_name, distance, tmp_p
     read = read_pairs(tmp_path / "pairs.parquet")
     assert len(read) > 300
     assert (read.attrs["suspicions"], ODD in read) == ([], False)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3])
+def test_ordinary_gaps_are_no_other_unit(gap):
+    assert suspected(town(3, gap=[gap, 0.05, 0.0]))[0] == []

@@ -193,3 +193,8 @@ def test_the_exact_history_first_touches_at_the_largest_relative_displacement():
     )
     assert np.all(apart == 0.0)
     assert np.all(touching > 0.0)
+
+
+def test_components_of_different_length_are_refused():
+    with pytest.raises(ValueError, match="equally long"):
+        directional_relative_displacement([0.0, 1.0], [0.0], 0.01, 1.0, 0.05, 2.0, 0.05, 0.0)

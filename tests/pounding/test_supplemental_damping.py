@@ -82,3 +82,8 @@ def test_required_gap_is_the_last_that_fails():
     assert required_gap(*pair, 50.0) == 0.0
     assert required_gap(*pair, 1.0) == pytest.approx(0.5)
     assert np.isnan(required_gap(1.0, 0.3, 1.0, 1.4, 1.0, 1.0, 0.65, 0.2, 1.2))
+
+
+def test_a_target_below_one_is_refused():
+    with pytest.raises(ValueError, match="target"):
+        required_gap(0.3, 0.4, 1.0, 1.3, 1.0, 2.0, 0.65, 0.5, 0.9)

@@ -6,7 +6,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Response
 
-from per_obspy.config import Check, Checks
+from per_obspy.config import Check, Checks, Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.account import (
     SILENT_HEADER,
@@ -17,10 +17,12 @@ from per_obspy.processing.account import (
     judge,
     record_flags,
     rejection,
+    survivors,
     taken,
     with_flags,
     with_note,
 )
+from per_obspy.processing.chain import pass_through
 from per_obspy.processing.earthquake import fallback_highpass
 from per_obspy.screening.columns import RECORD_FLAGS
 
@@ -172,3 +174,30 @@ def test_film_is_a_flag_and_a_warning():
     noted = with_flags(film)
     assert record_flags(noted) == ["digitised"]
     assert "film" in noted.stats.per_obspy.warnings
+
+
+def test_a_bad_trace_is_rejected_alone():
+    # a step that refuses one channel
+    def picky(trace):
+        if trace.stats.channel == "HNE":
+            raise RecordRejected(trace.id, "first", "second")
+        return trace
+
+    traces = [Trace(np.zeros(3), {"channel": channel}) for channel in ("HNE", "HNN")]
+    accepted, rejected = survivors(picky, traces)
+    assert [trace.stats.channel for trace in accepted] == ["HNN"]
+    assert rejected[0].reasons == ("first", "second")
+
+
+def test_a_silent_header_is_an_assumed_corner(earthquake):
+    header = {
+        "sampling_rate": 100.0,
+        "channel": "HNE",
+        "units": "m/s2",
+        "processing_level": "processed",
+    }
+    silent = pass_through(Trace(earthquake(), header), Processing())
+    assert "assumed_corners" in silent.stats.per_obspy.record_flags.split()
+    header["corners"] = AttribDict(highpass=0.1, lowpass=30.0)
+    known = pass_through(Trace(earthquake(), header), Processing())
+    assert "assumed_corners" not in known.stats.per_obspy.get("record_flags", "")

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from obspy import Inventory, Stream, Trace, UTCDateTime, read, read_inventory
+from obspy.core import AttribDict
 
 from per_obspy.config import Checks, Processing
 from per_obspy.errors import RecordRejected
@@ -269,3 +270,18 @@ def test_the_raw_record_stays_unchanged(earthquake):
     earlier = stream.copy(), processed.copy()
     before_processing(stream, processed, SETTINGS)
     assert (stream, processed) == earlier
+
+
+def test_records_processed_already_pass_through():
+    corners = AttribDict(highpass=0.1, lowpass=30.0)
+    out = process(station(processing_level="processed", corners=corners))[0]
+    assert_array_equal(out.data, pulse())
+    assert (out.stats.per_obspy.highpass, out.stats.per_obspy.lowpass) == (0.1, 30.0)
+    assert out.stats.per_obspy.highpass_source == "header"
+
+
+def test_the_mean_is_that_of_the_noise(earthquake):
+    trace = recorded(earthquake() + 0.3)
+    processed = process_station(Stream([trace]), SETTINGS)[0][0]
+    before = before_processing(Stream([trace]), processed, SETTINGS)
+    assert abs(before.data[:1500].mean()) < 1e-5

@@ -223,3 +223,9 @@ def test_a_recorded_drift_is_cleaned_to_the_target(earthquake):
     corner = clean_highpass(drift, 1 / 120, HIGHEST, TARGET)
     assert drift(corner) == pytest.approx(TARGET, abs=1e-3)
     assert drift(0.9 * corner) > TARGET
+
+
+def test_corners_of_the_configuration_are_not_searched(earthquake):
+    settings = Processing(highpass=0.4, lowpass=20.0)
+    chosen = with_corners(record(earthquake()), settings, None).stats.per_obspy
+    assert (chosen.highpass, chosen.lowpass, chosen.highpass_source) == (0.4, 20.0, "configuration")

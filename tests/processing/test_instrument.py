@@ -252,3 +252,15 @@ def test_motion_that_does_not_rest_is_a_warning(earthquake):
     known = pass_through(moving, SETTINGS).stats.per_obspy
     assert "final velocity over its peak" in known.warnings
     assert "largest sample off the header's 99" in known.warnings
+
+
+def test_noise_is_measured_before_the_wave_of_the_vertical(record):
+    out, _ = process_instrument(Stream([record("HNE"), record("HNZ", 3)]), SETTINGS, None)
+    assert out[0].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
+
+
+def test_an_outlier_is_dropped_with_its_figure(record):
+    three = Stream([record("HNE"), record("HNN", 2, factor=8.0), record("HNZ", 3)])
+    out, rejected = process_instrument(three, SETTINGS, None)
+    assert {trace.stats.channel for trace in out} == {"HNE", "HNZ"}
+    assert "peak over that of" in rejected[0].reasons[0]

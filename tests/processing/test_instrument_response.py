@@ -342,3 +342,10 @@ def test_an_accelerometer_that_is_described_by_velocity_is_differentiated_with_a
     assert "warnings" not in in_acceleration(
         counts(GAIN * velocity, response=response("M/S"), channel="HHE"), TOLERANCE
     ).stats.get("per_obspy", {})
+
+
+def test_physical_records_pass():
+    acceleration, _ = motion()
+    assert_array_equal(
+        in_acceleration(counts(acceleration, units="m/s2"), TOLERANCE).data, acceleration
+    )

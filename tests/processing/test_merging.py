@@ -252,3 +252,12 @@ def test_maule_records_in_two_files_become_one(real_data, station):
     moving = [trace for trace in whole if np.ptp(trace.data)]
     count = parts[0][0].stats.npts + parts[1][0].stats.npts - 1999
     assert {trace.stats.npts for trace in moving} == {count}
+
+
+def test_components_under_one_code_never_give_the_last_one():
+    parts = [trace("HN") for _ in range(3)]
+    for seed, part in enumerate(parts):
+        part.data = np.random.default_rng(seed).normal(size=1000)
+    whole, rejected = merged(Stream(parts))
+    assert not whole
+    assert "1000 of 1000 samples contradict each other" in rejected[0].reasons[0]

@@ -266,3 +266,7 @@ def test_what_is_no_record_is_rejected_at_any_level(samples):
     )
     found = list(raw_findings(Trace(samples, {"sampling_rate": RATE}), lenient))
     assert [finding.level for finding in found].count("reject") == 1
+
+
+def test_a_header_without_a_peak_has_no_finding(earthquake):
+    assert "header_peak" not in checks_that_fail(Trace(earthquake()))

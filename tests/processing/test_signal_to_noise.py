@@ -124,3 +124,11 @@ def test_a_long_spectrum_is_smoothed_as_a_short_one_in_little_memory(monkeypatch
     assert_allclose(found, stored, rtol=1e-12)
     # A few arrays of one window, rather than 40 weights with their places for each line
     assert peak < 8 * 8 * lines
+
+
+@pytest.mark.parametrize("factor", [1e-6, 3.0])
+def test_smoothing_is_linear(factor):
+    spectra = np.random.default_rng(2).random((2, 601))
+    smooth = konno_ohmachi(spectra, STEP, CENTRES, 20.0)
+    scaled = konno_ohmachi(factor * spectra, STEP, CENTRES, 20.0)
+    assert_allclose(scaled, factor * smooth, rtol=1e-12)

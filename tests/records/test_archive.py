@@ -15,7 +15,7 @@ from obspy import Stream, Trace
 from per_obspy.config import Archives, Records
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.records.archive import Archive, archive_files, open_file
-from per_obspy.records.folder import find_stations
+from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.sources import find_sources
 
 AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
@@ -416,3 +416,15 @@ def test_a_changed_archive_is_walked_again(tmp_path: Path):
             file.write(bytes(len(content)))
         (path,) = archive_files(archive)[0]
         assert open_file(path).read() == content
+
+
+@every
+def test_records_in_archives_are_the_same_as_outside(tmp_path: Path, name: str):
+    archive = pack(tmp_path / name)
+    (tmp_path / "three.AT2").write_bytes(AT2)
+    paths = [archive / "three.AT2", tmp_path / "three.AT2"]
+    for path in paths:
+        (trace,), rejected = read_station([path], None)
+        assert rejected == ()
+        assert trace.stats.source == str(path)
+        assert "coordinates" not in trace.stats  # the AT2 format has none, and none are made up

@@ -251,3 +251,8 @@ def test_our_processing_of_gmprocess_s_raw_records_comes_to_its_results(real_dat
         # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse
         # by less than 1 %
         assert np.abs(same.data).max() == pytest.approx(np.abs(trace.data).max(), rel=0.01)
+
+
+def test_the_event(workspace: Path, simulation: Simulation):
+    assert has_event(workspace)
+    assert read_event(workspace).origins[0].time == simulation.event.origins[0].time

@@ -293,3 +293,10 @@ def test_plain_numbers_are_sent_to_their_configuration(tmp_path: Path, head: str
     (tmp_path / "REHS.090").write_text(head + 400 * row)
     with pytest.raises(RecordRejected, match=r"\[\[records.columns\]\]"):
         read_with_obspy(obspy.read, tmp_path / "REHS.090")
+
+
+def test_a_file_and_its_bytes_are_read_alike(tmp_path: Path):
+    path = tmp_path / "record.mseed"
+    record("HN1").write(str(path), format="MSEED")
+    (trace,) = read_bytes_with_obspy(obspy.read, path.read_bytes(), "service", format="MSEED")
+    assert trace == read_with_obspy(obspy.read, path)[0]

@@ -6,6 +6,7 @@ Covers per_obspy.records.file_list too: the files on which a result depends.
 
 import re
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
 from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.file_list import input_files
+from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.sources import find_path_sources, find_sources
 from per_obspy.simulation.earthquake import Simulation, scenario_event, simulate, write_simulation
@@ -297,3 +299,9 @@ def test_records_of_several_earthquakes_among_paths_are_a_warning(tmp_path: Path
     assert "2 earthquakes are used together, they start 2020-01-01T10:00, 2020-01-01T11:00" in (
         caplog.text
     )
+
+
+def test_readers_travel_to_other_processes_by_name(folder: Path):
+    for source in find_sources(Records(folder=folder), None).stations.values():
+        assert isinstance(source.reader, partial)
+        assert source.reader.func is read_station

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from station_files import START, THREE, record, write_records
 
+from per_obspy.errors import CatalogError
 from per_obspy.records.summary import describe_records
 
 RECORDS = [f"CI.CLC..{code}" for code in THREE]
@@ -47,3 +48,9 @@ def test_records_that_cannot_be_used_are_rejected(tmp_path: Path):
     records, rejected = describe_records(tmp_path)
     assert records == ()
     assert [rejection.name for rejection in rejected] == RECORDS
+
+
+def test_a_folder_without_records_is_refused(tmp_path: Path):
+    (tmp_path / "notes.txt").write_text("bring an umbrella")
+    with pytest.raises(CatalogError, match="none of its 1 files is a record"):
+        describe_records(tmp_path)

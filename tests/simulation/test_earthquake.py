@@ -4,9 +4,10 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
+import obspy
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from obspy import Trace, read_inventory
+from obspy import Trace, UTCDateTime, read_inventory
 from obspy.core.inventory import Comment
 from scipy import signal
 
@@ -19,6 +20,7 @@ from per_obspy.simulation.earthquake import (
     NOTICE,
     SimulatedStation,
     rock_acceleration,
+    scenario_event,
     scenario_inventory,
     simulate,
     write_simulation,
@@ -270,3 +272,34 @@ def test_a_real_record_is_never_marked():
 def header(code: str) -> dict[str, str]:
     """Return the codes of a record of a simulated station."""
     return {"network": "XX", "station": code, "channel": "HNN"}
+
+
+def test_everything_says_that_it_is_simulated(simulation):
+    assert {trace.stats.network for trace in simulation.stream} == {"XX"}
+    assert "SIMULATED" in simulation.inventory.source
+    assert all("SIMULATED" in station.comments[0].value for station in simulation.inventory[0])
+    assert "SIMULATED" in simulation.event.comments[0].text
+    assert "simulated" in simulation.event.event_descriptions[0].text
+
+
+def test_written_files_are_found(simulation, tmp_path):
+    write_simulation(simulation, tmp_path)
+    contents = find_stations(tmp_path)
+    assert contents.rejected == ()
+    assert sorted(contents.stations) == [f"XX.S{number:03d}" for number in range(1, 9)]
+    (event,) = obspy.read_events(tmp_path / "event.xml")
+    assert event.preferred_magnitude().mag == 7.0
+
+
+def test_the_event_is_that_of_the_scenario():
+    event = scenario_event(SMALL)
+    assert event.preferred_origin().time == UTCDateTime(2001, 2, 3, 4, 5, 6)
+    assert event.preferred_magnitude().mag == 6.5
+    assert event.comments[0].text == NOTICE
+
+
+def test_identifiers_depend_on_the_seed_alone():
+    # would catch ObsPy's random identifiers
+    assert scenario_event(SMALL).resource_id == scenario_event(SMALL).resource_id
+    other = scenario_event(SMALL.model_copy(update={"seed": SMALL.seed + 1}))
+    assert other.resource_id != scenario_event(SMALL).resource_id

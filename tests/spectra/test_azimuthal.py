@@ -120,3 +120,33 @@ def test_wrong_arguments_are_named(function, changed, message):
 def test_wrong_percentiles_are_refused(values, percentile):
     with pytest.raises(ValueError, match=r"spectrum must|percentile must"):
         rotd(values, percentile)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.7])
+def test_sampled_peaks_are_those_of_each_rotated_motion(pair, damping):
+    # catches samples that are ruled out wrongly, and peaks between the samples that slip in
+    azimuths = np.array([0.0, 7.0, 90.0, 133.3, 180.0, 271.0, -20.0])
+    per = sampled_azimuthal_per_spectrum(*pair, DT, PERIODS, damping, azimuths)
+    sd = sampled_azimuthal_sd_spectrum(*pair, DT, PERIODS, damping, azimuths)
+    for k, azimuth in enumerate(np.radians(azimuths)):
+        motion = pair[0] * np.cos(azimuth) + pair[1] * np.sin(azimuth)
+        along = sampled_response_spectra(motion, DT, PERIODS, damping)
+        # the same sums in another order
+        assert_allclose(per[:, k], along.per, rtol=1e-11)
+        assert_allclose(sd[:, k], along.sd, rtol=1e-11)
+
+
+def test_a_quarter_turn_of_the_ground_exchanges_the_components(pair):
+    # a' = -(the component that came from the east): catches a wrong sense of rotation
+    turned = azimuthal_per_spectrum(-pair[1], pair[0], DT, PERIODS, azimuths=[30.0, 120.0])
+    assert_allclose(
+        turned, azimuthal_per_spectrum(*pair, DT, PERIODS, azimuths=[-60.0, 30.0]), rtol=1e-12
+    )
+
+
+def test_half_a_turn_changes_nothing(pair):
+    once, turned = (
+        azimuthal_sd_spectrum(*pair, DT, PERIODS, azimuths=azimuths)
+        for azimuths in ([10.0], [190.0])
+    )
+    assert_allclose(turned, once, rtol=1e-12)

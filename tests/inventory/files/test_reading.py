@@ -405,3 +405,47 @@ def test_another_suffix_is_refused_before_anything_is_written(tmp_path):
     ):
         write_pairs(pd.DataFrame({"gap": [0.1]}), tmp_path / "pairs.xlsx")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_columns_of_numbers_stay_numbers(write):
+    pairs = read_pairs(write(f"{HEADER},floor area ratio\n{GOOD},2.5\n"))
+    assert pairs["floor area ratio"].dtype == np.float64
+
+
+def test_parquet_gives_the_same_as_csv(write, tmp_path):
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD}\n{GOOD.replace('007', '008')}\n"))
+    pairs.attrs.clear()
+    pairs.to_parquet(tmp_path / "pairs.parquet")
+    assert_frame_equal(read_pairs(tmp_path / "pairs.parquet"), pairs)
+
+
+def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
+    table = pd.DataFrame(
+        {"pair_id": ["a"], "gap": ["wide"], "longitude_1": [1.0], "latitude_1": [1.0]}
+    )
+    table = table.assign(longitude_2=1.0, latitude_2=1.0, height_1=3.0, height_2=3.0)
+    table.to_parquet(tmp_path / "pairs.parquet")
+    assert read_pairs(tmp_path / "pairs.parquet")["gap"].isna().tolist() == [True]
+    table.assign(latitude_1="north").to_parquet(tmp_path / "pairs.parquet")
+    pairs = read_pairs(tmp_path / "pairs.parquet")
+    assert pairs.empty
+    assert pairs.attrs["rejected"][0].reasons == ("latitude_1 = 'north' is not a number",)
+
+
+@pytest.mark.parametrize("position", [0, 5000, 19_000])
+def test_a_quotation_mark_among_many_rows_loses_its_own_row_only(tmp_path, position):
+    # blocks have 1 MB: would catch the 3 997 rows that one mark took away
+    rows = [_row(f"p{i}", note="x" * 100) for i in range(20_000)]
+    path = tmp_path / "pairs.csv"
+    text = [ZONED, *rows[:position], _row("open", note='"x'), *rows[position:], ""]
+    path.write_text("\n".join(text))
+    table, rejected = _in_chunks([path], 7000)
+    assert table["pair_id"].tolist() == [f"p{i}" for i in range(20_000)]
+    line = position + 2
+    assert [(rejection.name, rejection.row) for rejection in rejected] == [("open", line)]
+
+
+def test_a_hash_is_that_of_every_block():
+    # would catch hashes by the order of first occurrence, which differ from block to block
+    whole = name_hashes(pa.array(["a", "b", "c"]))
+    assert name_hashes(pa.array(["c", "a"])).tolist() == [whole[2], whole[0]]

@@ -253,3 +253,17 @@ def test_a_text_that_only_japanese_bytes_allow_names_the_line_that_is_not_utf_8(
     content = plain().content + "é".encode() + b"\x93\xfa\n"
     with pytest.raises(CatalogError, match=r"line 5 is not UTF-8 \(byte 0x93 at position 3\)"):
         read_pairs(write(content))
+
+
+def test_an_open_quotation_loses_its_own_row_only_with_semicolons(write):
+    text = text_of(NAMES, ROWS, ";", ",").replace("corner", '"corner')
+    pairs = read_pairs(write(text))
+    assert pairs["pair_id"].tolist() == ["b", "c"]
+    assert pairs.attrs["rejected"][0].row == 2
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 1 << 20])
+def test_a_character_may_lie_across_blocks(write, monkeypatch, block):
+    # would catch blocks that are decoded by themselves
+    monkeypatch.setattr(text_lines, "BLOCK", block)
+    assert check_text(write("pair_id,note\na,café €\n".encode())) == 2

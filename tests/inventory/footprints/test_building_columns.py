@@ -195,3 +195,20 @@ def test_the_deviation_of_a_height_reaches_the_probability():
         probability.append(float(risk["probability"].iloc[0]))
         assert ("height_1" in risk["derived"].iloc[0].split()) == (deviation > 0.0)
     assert probability[1] > 1.2 * probability[0] > 0.0
+
+
+def test_openstreetmap():
+    table = schema_columns(
+        pd.DataFrame({"osm_id": [12, 13], "building:levels": ["3", None], "building": ["yes"] * 2}),
+        "a",
+    )
+    assert table["building_id"].tolist() == ["12", "13"]
+    assert table["storeys"].tolist()[0] == 3.0
+
+
+def test_nothing_that_tells_a_height():
+    with pytest.raises(
+        CatalogError,
+        match=r"town.gpkg: no column height, storeys or period .*columns found: colour",
+    ):
+        schema_columns(pd.DataFrame({"colour": ["red"]}), "town.gpkg")

@@ -155,3 +155,32 @@ def test_damaged_files_end_in_one_line(tmp_path, content):
     with pytest.raises(CatalogError) as error:
         pairs_from_footprints(path)
     assert "\n" not in str(error.value)
+
+
+def test_cells_that_are_no_polygon(write):
+    box = shapely.box(0.3, 0, 0.3001, 1e-4).wkt
+    nested = "GEOMETRYCOLLECTION(" * 100_000
+    lines = [f'a,"{box}",9', "b,,9", "c,POINT (0 0),9", "d,POLYGON ((0 0),9", f"e,{nested},9"]
+    found = read_csv_buildings(write("id,wkt,height", *lines), "town.csv")
+    assert sorted(found.faults) == [1, 2, 3, 4]
+    assert found.faults[1] == "wkt is empty"
+    assert found.faults[2] == "wkt = 'POINT (0 0)' is no polygon as WKT or GeoJSON"
+    assert len(found.faults[4]) < 100
+    assert found.numbers.tolist() == [2, 3, 4, 5, 6]
+
+
+def test_rows_with_another_number_of_cells_are_named_by_line(tmp_path):
+    path = google(tmp_path, small_town())
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], "1,2,3", *lines[1:]]))
+    pairs = pairs_from_footprints(path)
+    assert len(pairs) == 2
+    (rejected,) = pairs.attrs["rejected"]
+    assert (rejected.row, *rejected.reasons) == (2, "3 columns, the header has 7")
+
+
+def test_outlines_without_heights_say_what_to_add(tmp_path):
+    path = google(tmp_path, small_town())
+    pd.read_csv(path).drop(columns="building_height").to_csv(path, index=False)
+    with pytest.raises(CatalogError, match=r"no column height.*Google Open Buildings.*add one"):
+        pairs_from_footprints(path)

@@ -1,6 +1,9 @@
 """Pairs from footprint files: every format, faults of features, real and synthetic cities."""
 
+import json
+
 import numpy as np
+import pyarrow as pa
 import pyogrio
 import pyproj
 import pytest
@@ -427,3 +430,20 @@ def test_points_of_berkeley_are_no_footprints(real_data):
         match=r"points have no walls.*an area \(PlanArea\).*add a column wkt .*or width, length",
     ):
         pairs_from_footprints(real_data / "inventories" / "BerkeleyBuildings_full.csv")
+
+
+def _write_geoparquet(path, polygons, **column):
+    described = {"primary_column": "shape", "columns": {"shape": {"encoding": "WKB"} | column}}
+    table = pa.table(
+        {
+            "height": HEIGHTS,
+            "storeys": STOREYS,
+            "shape": shapely.to_wkb(_degrees(polygons)).tolist(),
+        }
+    )
+    pa.parquet.write_table(table.replace_schema_metadata({"geo": json.dumps(described)}), path)
+    return path
+
+
+def test_geoparquet_gives_the_same_row(tmp_path):
+    _check_row(pairs_from_footprints(_write_geoparquet(tmp_path / "town.parquet", ROW)))

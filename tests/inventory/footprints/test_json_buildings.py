@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import shapely
 from building_samples import (
     brails_geojson,
     geometries,
@@ -173,3 +174,20 @@ def test_too_large_a_file_is_refused_unread(tmp_path, monkeypatch):
     monkeypatch.setattr(json_buildings, "LARGEST_ASSETS", 1 << 10)
     with pytest.raises(CatalogError, match="split the file"):
         read_asset_json(r2d_assets(tmp_path, small_town()), "a")
+
+
+def test_coordinates_in_metres_are_outside_of_degrees(tmp_path):
+    town = small_town()
+    outlines = shapely.transform(town.outlines, lambda xy: xy * 1e5)
+    with pytest.raises(CatalogError, match=r"0 usable footprints.*lie outside"):
+        pairs_from_footprints(microsoft(tmp_path, town._replace(outlines=outlines)))
+
+
+def test_a_height_of_minus_one_is_unknown(tmp_path):
+    town = small_town()
+    path = microsoft(tmp_path, town._replace(heights=[12.0, -1.0, 6.0, 9.0]))
+    pairs = pairs_from_footprints(path)
+    # too few buildings for an estimate: both pairs of the second building are rejected
+    assert pairs.empty
+    reasons = {reason for row in pairs.attrs["rejected"] for reason in row.reasons}
+    assert any("one is needed" in reason for reason in reasons)

@@ -10,6 +10,7 @@ import pytest
 import shapely
 from building_samples import (
     geometries,
+    google,
     microsoft_packed,
     osm_xml,
     overture,
@@ -135,3 +136,24 @@ def test_a_source_without_rows_and_another_structure():
     assert layer_files._without_nesting(table)["sources"].to_pylist() == [None, None, None]
     table = pa.table({"sources": pa.array([[1], None])})
     assert layer_files._without_nesting(table)["sources"].to_pylist() == [None, None]
+
+
+def test_packed_csv_of_google(tmp_path):
+    path = google(tmp_path, small_town())
+    packed = tmp_path / "0c5_buildings.csv.gz"
+    packed.write_bytes(gzip.compress(path.read_bytes()))
+    assert len(pairs_from_footprints(packed)) == 2
+
+
+def test_a_cut_extract(tmp_path):
+    path = tmp_path / "a.osm.pbf"
+    path.write_bytes(REAL.read_bytes()[:4000])
+    with pytest.raises(CatalogError):
+        pairs_from_footprints(path)
+
+
+@pytest.mark.parametrize(("text", "expected"), [("10", 10.0), ("9.5 m", 9.5), ("40 ft", 12.192)])
+def test_heights_with_units(tmp_path, text, expected):
+    path = osm_xml(tmp_path, small_town())
+    path.write_text(path.read_text().replace('v="12.0"', f'v="{text}"'))
+    assert pairs_from_footprints(path)["height_1"].tolist()[0] == pytest.approx(expected)

@@ -131,3 +131,26 @@ def test_a_pair_that_may_yield_or_touch_goes_on():
     assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
     row[0, columns.YIELD], row[0, columns.PHASE] = 0.05, 1.0
     assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
+
+
+def test_a_quiet_pair_is_still_and_an_excited_one_is_not():
+    quiet, late = np.zeros((2, 40)), np.zeros((2, 40))
+    late[0, 30] = 0.1
+    for gap in (0.0, 0.05):
+        row = _row(1e-5, gap=gap)
+        assert remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
+        # a late pulse counts only along its direction, and not once it is over
+        strong = 60.0 * late
+        assert not remains_still(row, 1.0, 0.0, strong, 1.28, 0)
+        assert remains_still(row, 0.0, 1.0, strong, 1.28, 0)
+        assert remains_still(row, 1.0, 0.0, strong, 1.28, 31)
+        assert not remains_still(_row(0.2, gap=gap), 1.0, 0.0, quiet, 1.28, 0)
+
+
+def test_impacts_that_count_keep_a_touching_pair_going():
+    quiet = np.zeros((2, 40))
+    # released from 5 mm both are at most 5e-3 omega fast; 1 % of 1 m/s counts
+    assert not remains_still(_row(5e-3), 1.0, 0.0, quiet, 1.28, 0)
+    assert remains_still(_row(5e-3, fastest=50.0), 1.0, 0.0, quiet, 1.28, 0)
+    # before the first impact every impact is the fastest
+    assert not remains_still(_row(1e-9, fastest=0.0), 1.0, 0.0, quiet, 1.28, 0)

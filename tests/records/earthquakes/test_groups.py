@@ -158,3 +158,8 @@ def test_a_time_without_records_is_refused():
     message = r"records\.event: no record is of 2019-07-06T03:10.*17:33, .*03:19: choose one"
     with pytest.raises(CatalogError, match=message):
         chosen_group(groups, MAIN - 593, "records.event", no_motion)
+
+
+def test_the_group_of_most_stations_is_chosen():
+    groups = event_groups([span("N.A", FORE), span("N.B", FORE), span("N.A", MAIN)])
+    assert chosen_group(groups, None, "", no_motion) is groups[0]

@@ -205,3 +205,14 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes):
     (tmp_path / "event.xml").write_bytes(content)
     with pytest.raises(CatalogError, match=r"event\.xml"):
         read_event(tmp_path / "event.xml")
+
+
+def test_the_hash_is_that_of_the_file(event_file: Path):
+    file = read_event_file(event_file)
+    assert (file.path, file.hash) == (event_file, file_hash(event_file))
+    assert file.event == read_event(event_file)
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    with pytest.raises(CatalogError, match=r"missing\.xml: cannot be read: No such file"):
+        read_event(tmp_path / "missing.xml")

@@ -319,3 +319,22 @@ def test_a_file_is_no_identifier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_every_provider_of_records_is_known():
     for provider in {*OTHERS, *sum(RECORDS_OF.values(), ())}:
         assert provider in ROUTERS or base_url(provider).startswith("https://")
+
+
+def test_quakeml(simulation: Simulation, tmp_path: Path):
+    Catalog([simulation.event]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    (row,) = find_events(str(tmp_path / "event.xml"), {})
+    assert (row.latitude, row.depth, row.magnitude) == (-1.5, 12_000.0, 6.5)
+
+
+@pytest.mark.parametrize(
+    ("origins", "reason"),
+    [
+        ([], "has no origin"),
+        ([Origin(latitude=1.0, longitude=2.0)], "an origin without time"),
+    ],
+)
+def test_an_event_without_origin_or_time_is_refused(tmp_path: Path, origins, reason: str):
+    Catalog([Event(origins=origins)]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match=reason):
+        find_events(str(tmp_path / "event.xml"), {})

@@ -576,3 +576,66 @@ def test_a_damaged_event_is_fetched_again(server: FdsnServer, ask: Ask, tmp_path
     path.write_bytes(path.read_bytes()[:300])
     assert names(ask()) == STATIONS
     assert server.asked("event") == 2
+
+
+def test_records_end_with_the_window(ask: Ask):
+    fetched = ask(before=10, after=20)
+    for paths in fetched_stations(fetched).stations.values():
+        for trace in read_station(paths, None)[0]:
+            assert trace.stats.starttime >= fetched.wanted.start
+            assert trace.stats.endtime <= fetched.wanted.end
+
+
+def test_nothing_is_fetched_twice(server: FdsnServer, ask: Ask):
+    first = ask()
+    asked = len(server.requests)
+    assert server.asked("dataselect") == len(STATIONS)
+    assert ask() == first
+    assert len(server.requests) == asked
+
+
+def test_records_of_another_year_are_refused_and_counted(server: FdsnServer, ask: Ask):
+    for name in STATIONS[1:]:
+        server.fail("dataselect", name[3:], changed(moved(-365 * 86400.0)))
+    first = ask()
+    assert names(first) == STATIONS[:1]
+    rows = fetched_stations(first).rejected
+    assert [row.name for row in rows] == STATIONS[1:]
+    assert all("of another time" in row.reasons[0] for row in rows)
+    # the fault may pass: the rest is asked for again, and only that
+    assert not first.is_complete
+    assert names(ask()) == STATIONS
+    assert server.asked("dataselect", "S001") == 1
+
+
+def test_an_empty_answer_is_asked_again_and_no_answer_of_no_data(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", empty)
+    first = ask()
+    (row,) = first.rejected
+    assert (row.name, first.is_complete) == ("XX.S002", False)
+    assert 'which is not "no data"' in row.reasons[0]
+    assert names(ask()) == STATIONS
+
+
+def test_a_short_line_of_a_list_costs_no_other_line(server: FdsnServer, ask: Ask):
+    lines = server.fdsn_list().splitlines()
+    server.fail("station", "*", content(b"\n".join([lines[0], lines[1][:20], *lines[1:]])))
+    fetched = ask()
+    assert names(fetched) == STATIONS
+    assert "columns, expected 17" in fetched.rejected[0].reasons[0]
+
+
+def test_the_status_has_the_reasons_why_stations_are_missing(
+    server: FdsnServer, ask: Ask, tmp_path: Path
+):
+    server.fail("dataselect", "S002", status(204))
+    fetched = ask()
+    (status_file,) = tmp_path.glob("complete-*.json")
+    assert json.loads(status_file.read_text())["rejected"][0][:2] == ["station", "XX.S002"]
+    assert ask().rejected == fetched.rejected
+
+
+def test_the_channels_that_were_asked_for_are_kept(ask: Ask):
+    status = json.loads((ask().folder / "XX.S001.json").read_text())
+    assert sorted(status["channels"]) == [["", "HNE"], ["", "HNN"], ["", "HNZ"]]
+    assert sorted(status["outputs"]) == ["XX.S001.mseed", "XX.S001.xml"]

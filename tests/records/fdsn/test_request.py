@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
+import pytest
 from obspy import UTCDateTime
 from obspy.core.event import Event, Origin
 from obspy.core.inventory import Inventory, Network, Station
 
 from per_obspy.config import Fdsn
-from per_obspy.errors import ServiceError
+from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.fdsn import providers
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
@@ -17,6 +19,7 @@ from per_obspy.records.fdsn.request import (
     station_parameters,
     stations_inside,
     wanted_around,
+    window,
 )
 from per_obspy.records.fdsn.web import WebPool
 
@@ -67,3 +70,25 @@ def test_a_router_that_does_not_answer_is_a_rejection(monkeypatch):
     urls, (rejection,) = base_urls(WebPool(1.0, 0, 0.0), ["eida-routing", "http://a.example"], {})
     assert urls == ["http://a.example"]
     assert (rejection.name, rejection.reasons) == ("eida-routing", ("no answer",))
+
+
+KILOMETRES_PER_DEGREE = np.pi * 6371.0 / 180.0
+
+
+def test_missing_place_and_window_are_those_of_the_event():
+    wanted = wanted_around(request(), EVENT)
+    assert (wanted.latitude, wanted.longitude) == (10.0, 20.0)
+    assert (wanted.start, wanted.end) == (ORIGIN - 30, ORIGIN + 90)
+    assert wanted.radius == pytest.approx(100.0 / KILOMETRES_PER_DEGREE, rel=1e-6)
+
+
+def test_place_and_window_need_no_event():
+    times = {"start": "2021-05-06T07:08:09", "end": "2021-05-06T07:09:00"}
+    wanted = wanted_around(request(latitude=-1.0, longitude=2.0, **times), None)
+    assert (wanted.latitude, wanted.longitude) == (-1.0, 2.0)
+    assert wanted.end - wanted.start == 51.0
+
+
+def test_a_window_must_end_after_its_start():
+    with pytest.raises(CatalogError, match="window: must end after its start, got 2020-01-01T11"):
+        window(request(end="2020-01-01T11:00:00"), EVENT)

@@ -156,3 +156,19 @@ def test_a_password_goes_to_the_host_that_it_is_for(server: FdsnServer, pool: We
         answer(pool, f"{url}/fdsnws/station/1/query", LIST)
     # RFC 7617: base64 of user:se@cret
     assert sent == ["Basic dXNlcjpzZUBjcmV0", None]
+
+
+def test_a_whole_answer_comes_back(server: FdsnServer, pool: WebPool):
+    assert b"|S001|" in stations(server, pool)
+
+
+def test_no_data_is_an_empty_answer(server: FdsnServer, pool: WebPool):
+    assert stations(server, pool, network="YY") == b""
+
+
+@pytest.mark.parametrize("fault", [status(503), status(429), cut])
+def test_faults_that_pass_are_tried_again(server: FdsnServer, pool: WebPool, fault):
+    before = server.asked("station")
+    server.fail("station", "*", fault)
+    assert b"|S001|" in stations(server, pool)
+    assert server.asked("station") == before + 2
