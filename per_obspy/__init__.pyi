@@ -7,7 +7,6 @@ from .inventory.periods import asce7_period as asce7_period
 from .inventory.periods import ec8_period as ec8_period
 from .inventory.shear_building import equivalent_sdof as equivalent_sdof
 from .inventory.shear_building import shear_building as shear_building
-from .pipeline.run import run as run
 from .pounding.bumpers import bumper_restitution as bumper_restitution
 from .pounding.bumpers import jankowski_damping as jankowski_damping
 from .pounding.bumpers import kelvin_voigt_damping as kelvin_voigt_damping
@@ -46,6 +45,7 @@ from .pounding.structure import Structure as Structure
 from .pounding.supplemental_damping import required_gap as required_gap
 from .pounding.supplemental_damping import supplemental_damping as supplemental_damping
 from .processing.chain import process as process
+from .runs.run import run as run
 from .screening.risk import risk_table as risk_table
 from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum
 from .spectra.azimuthal import rotd as rotd

@@ -19,7 +19,7 @@ from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
-from .pipeline.small_run import plain_reports
+from .runs.small_run import plain_reports
 
 ROW = {
     "pair_id": "a", "longitude_1": 0.3, "latitude_1": 0.1, "height_1": 10.0,

@@ -115,7 +115,7 @@ def test_a_format_plugin_loads_nothing_heavy():
 
 
 def test_a_run_needs_no_library_of_an_extra():
-    code = "import sys, per_obspy.pipeline.stages, per_obspy.commands.screen; print(*sys.modules)"
+    code = "import sys, per_obspy.runs.stages, per_obspy.cli.screen; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

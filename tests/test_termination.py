@@ -12,9 +12,9 @@ import pytest
 
 from per_obspy import termination
 from per_obspy.config import Run, load
-from per_obspy.pipeline.run import run
+from per_obspy.runs.run import run
 
-from .pipeline.small_run import SCENARIO, InProcess, plain_figures, write_configuration
+from .runs.small_run import SCENARIO, InProcess, plain_figures, write_configuration
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
@@ -67,7 +67,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 from per_obspy import termination
-from per_obspy.tables.parts import batches, bounded_database
+from per_obspy.results.parts import batches, bounded_database
 def rows():
     while True:
         yield pa.record_batch([pa.array(np.arange(20_000))], names=["number"])

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from per_obspy import threads
-from per_obspy.jobs.parallel import Work, Workers, results
+from per_obspy.runs.tasks.parallel import Work, Workers, results
 from per_obspy.threads import map_in_threads, usable_processors, use_one_thread
 
 

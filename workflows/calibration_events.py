@@ -13,10 +13,10 @@ from obspy import Stream
 from per_obspy import process, station_spectra
 from per_obspy.config import Processing, Records, Spectra
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.jobs.parallel import Workers
-from per_obspy.pipeline.stations import finished_stations, station_jobs
 from per_obspy.records.sources import find_sources
 from per_obspy.records.text_table import read_columns
+from per_obspy.runs.stations import finished_stations, station_jobs
+from per_obspy.runs.tasks.parallel import Workers
 from per_obspy.screening.site_motion import HYPOCENTRE, Hypocentre, hypocentre_of
 from per_obspy.spectra.storage import read_spectra
 

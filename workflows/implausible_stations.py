@@ -20,9 +20,9 @@ from calibration_events import LAKEBED, real_events
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing, Records, Spectra
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.jobs.parallel import Workers
-from per_obspy.pipeline.stations import finished_stations, station_jobs
 from per_obspy.records.sources import find_sources
+from per_obspy.runs.stations import finished_stations, station_jobs
+from per_obspy.runs.tasks.parallel import Workers
 from per_obspy.screening.amplitudes import (
     FLAGGED,
     MEASURES,

@@ -9,7 +9,7 @@ import argparse
 import shutil
 from pathlib import Path
 
-from per_obspy.pipeline.run import run
+from per_obspy.runs.run import run
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 

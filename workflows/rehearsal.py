@@ -31,7 +31,7 @@ from small_run import InProcess, plain_figures  # noqa: E402
 from watched_city import ORIGIN, city_earthquake, settings_of, write_city  # noqa: E402
 
 from per_obspy.errors import PerError  # noqa: E402
-from per_obspy.operation.watch import Clock, watch_once  # noqa: E402
+from per_obspy.watch.watch import Clock, watch_once  # noqa: E402
 
 #: Tables that must be the same to the byte.
 TABLES = ("risk.parquet", "risk.csv", "stations.csv", "rejected.csv", "rows.parquet")

@@ -25,7 +25,7 @@ ROOMS = {
     "processing": "Processing of records",
     "inventory": "Buildings and pairs",
     "screening": "Screening",
-    "pipeline": "Whole runs",
+    "runs": "Whole runs",
 }
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from tables import code, table, write_page
 
-from per_obspy.cli import app
+from per_obspy.cli.application import app
 
 INTRODUCTION = """
 # Command line

@@ -38,9 +38,9 @@ from per_obspy.checks import FloatArray
 from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.tables.parts import batches, bounded_database
-from per_obspy.tables.ranked_table import RankedTable
-from per_obspy.tables.table_files import regrouped
+from per_obspy.results.parts import batches, bounded_database
+from per_obspy.results.ranked_table import RankedTable
+from per_obspy.results.table_files import regrouped
 
 #: Columns of the pair table without which no pair names its buildings.
 IDENTIFIERS = ("building_id_1", "building_id_2")

@@ -31,10 +31,10 @@ from per_obspy.buildings.sides import OF_PAIRS, building_table, directions
 from per_obspy.config import Run, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
-from per_obspy.tables.parts import text_columns
-from per_obspy.tables.risk import write_worst
-from per_obspy.tables.table_files import regrouped, schema_of, table_of, write_meanings
-from per_obspy.tables.totals import areas_of
+from per_obspy.results.parts import text_columns
+from per_obspy.results.risk import write_worst
+from per_obspy.results.table_files import regrouped, schema_of, table_of, write_meanings
+from per_obspy.results.totals import areas_of
 
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from per_obspy.errors import shortened
-from per_obspy.tables.coverage import Coverage, Search
+from per_obspy.results.coverage import Coverage, Search
 
 #: Kinds of reasons that a sentence names.
 NAMED = 4

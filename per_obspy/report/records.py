@@ -26,7 +26,7 @@ from per_obspy.report.style import (
     USABLE_COLOUR,
     literal,
 )
-from per_obspy.tables.station_summary import RECORD_COLUMNS
+from per_obspy.results.station_summary import RECORD_COLUMNS
 
 SMOOTHING = Processing().smoothing  # b of the Konno-Ohmachi window
 PAGE = (11.7, 8.3)  # inches: A4, landscape

@@ -9,7 +9,7 @@ import pandas as pd
 
 from per_obspy.report.page.texts import Language
 from per_obspy.report.tally import PairTally
-from per_obspy.tables.coverage import Coverage
+from per_obspy.results.coverage import Coverage
 
 
 class Region(NamedTuple):

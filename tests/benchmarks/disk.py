@@ -19,14 +19,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import file_hash
-from per_obspy.tables.parts import TOGETHER, part_rows, text_columns
-from per_obspy.tables.ranked_cells import (
+from per_obspy.results.parts import TOGETHER, part_rows, text_columns
+from per_obspy.results.ranked_cells import (
     BATCH,
     CellRows,
     arranged_rows,
     arranged_writer,
 )
-from per_obspy.tables.ranked_table import ROWS
+from per_obspy.results.ranked_table import ROWS
 from per_obspy.threads import use_one_thread
 
 #: Bytes of a block, and number of blocks.

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 
 from per_obspy.buildings.search import find_rows
 from per_obspy.config.pairs import Rows
-from per_obspy.tables.ranked_table import ranked_table
+from per_obspy.results.ranked_table import ranked_table
 
 NAMES = ("pair_id", "building_id_1", "building_id_2")
 

@@ -18,14 +18,14 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.files import file_hash
-from per_obspy.jobs.parallel import Workers
-from per_obspy.jobs.parts import Part
-from per_obspy.jobs.risk_cells import write_cells, write_texts
+from per_obspy.results.parts import write_part
+from per_obspy.results.ranked_table import table_files
+from per_obspy.results.risk import write_risk
 from per_obspy.resume import write_status
+from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.parts import Part
+from per_obspy.runs.tasks.risk_cells import write_cells, write_texts
 from per_obspy.screening.ranking import in_order
-from per_obspy.tables.parts import write_part
-from per_obspy.tables.ranked_table import table_files
-from per_obspy.tables.risk import write_risk
 
 
 def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Part:

@@ -30,13 +30,13 @@ CHECKOUT = Path(__file__).parents[2]
 #: workers, after its own libraries are loaded.
 WORKER = """
 import contextlib, time
-from per_obspy.jobs import worker_start
-from per_obspy.jobs.parallel import Workers, Work, prepare_workers, results
+from per_obspy.runs.tasks import worker_start
+from per_obspy.runs.tasks.parallel import Workers, Work, prepare_workers, results
 with {context}:
     prepare_workers(2)
-    import per_obspy.pipeline.stages
+    import per_obspy.runs.stages
     start = time.perf_counter()
-    task = "__import__('per_obspy.jobs.station') and 0"
+    task = "__import__('per_obspy.runs.tasks.station') and 0"
     next(results([task] * 2, Work(eval, print), Workers(2)))
     print(time.perf_counter() - start)
 """

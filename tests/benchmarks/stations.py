@@ -43,9 +43,9 @@ def simulated(stations: int, folder: Path) -> tuple[Path, Path]:
 def one_station(records: Path, folder: Path) -> tuple[float, dict[str, float], int]:
     """Return processor time of a station, that of its parts, and samples, the fastest of some."""
     from per_obspy.config import Processing, Records, Spectra
-    from per_obspy.jobs import station as work
-    from per_obspy.pipeline.stations import station_jobs
     from per_obspy.records.sources import find_sources
+    from per_obspy.runs.stations import station_jobs
+    from per_obspy.runs.tasks import station as work
 
     parts: dict[str, float] = {}
 

@@ -8,10 +8,10 @@ import pyarrow as pa
 import pytest
 
 from per_obspy.buildings.columns import ROWS
-from per_obspy.jobs import building_rows
-from per_obspy.jobs.building_rows import RowsJob, do_row_chunks
-from per_obspy.jobs.parallel import Workers
-from per_obspy.jobs.parts import rejections
+from per_obspy.runs.tasks import building_rows
+from per_obspy.runs.tasks.building_rows import RowsJob, do_row_chunks
+from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.parts import rejections
 
 
 def contacts(**changes):

@@ -9,7 +9,7 @@ import pytest
 from per_obspy.buildings import search
 from per_obspy.buildings.search import one_thread_database, serving_stations, whole_groups
 from per_obspy.config.pairs import Rows
-from per_obspy.tables.ranked_table import ranked_table
+from per_obspy.results.ranked_table import ranked_table
 
 from .street import street, table_of
 

@@ -11,7 +11,7 @@ from per_obspy.report.coverage import (
     coverage_sentences,
     kind_text,
 )
-from per_obspy.tables.coverage import _FAULTS, _KINDS, OTHERS, Coverage, Search
+from per_obspy.results.coverage import _FAULTS, _KINDS, OTHERS, Coverage, Search
 
 SEARCH = Search(449, {"no height, storeys or period": 1469}, {"no outline": 3})
 

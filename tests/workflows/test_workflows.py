@@ -8,13 +8,13 @@ import pytest
 
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
-from per_obspy.pipeline.ensemble import screen_scenarios
-from per_obspy.pipeline.run import run
+from per_obspy.results.table_files import rounded
+from per_obspy.runs.ensemble import screen_scenarios
+from per_obspy.runs.run import run
 from per_obspy.screening.totals import hexagons
 from per_obspy.spectra.storage import read_spectra
-from per_obspy.tables.table_files import rounded
 
-from ..pipeline.small_run import InProcess, plain_reports
+from ..runs.small_run import InProcess, plain_reports
 
 pytestmark = pytest.mark.long
 

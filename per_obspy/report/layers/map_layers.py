@@ -31,9 +31,9 @@ from per_obspy.report.layers.qgis import (
     single_style,
     write_project,
 )
+from per_obspy.results.parts import batches, bounded_database, parquet_rows
+from per_obspy.results.totals import RegionTotals
 from per_obspy.screening.columns import known_column
-from per_obspy.tables.parts import batches, bounded_database, parquet_rows
-from per_obspy.tables.totals import RegionTotals
 
 if TYPE_CHECKING:
     from per_obspy.checks import FloatArray

@@ -12,7 +12,7 @@ import pandas as pd
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import FORMULA
-from per_obspy.tables.table_files import rounded_table
+from per_obspy.results.table_files import rounded_table
 
 #: Largest number of rows of a sheet: a workbook is opened whole.
 ROWS = 5000

@@ -23,8 +23,8 @@ from pyarrow import parquet
 
 from per_obspy.report.layers.geopackage import layer_names
 from per_obspy.report.layers.map_layers import MapSources, write_layers
+from per_obspy.results.totals import RegionTotals
 from per_obspy.screening.totals import box_outlines, grid_cells, joined_totals, partial_totals
-from per_obspy.tables.totals import RegionTotals
 
 CLASSES = ("severe", "high", "low")
 TABLE = pd.DataFrame(

@@ -7,7 +7,7 @@ import pandas as pd
 
 from per_obspy.report.results import Drawings, Event, Region, Results
 from per_obspy.report.tally import PAGE_PAIRS, PairTally
-from per_obspy.tables.coverage import Coverage
+from per_obspy.results.coverage import Coverage
 
 CLASSES = ("severe", "high", "moderate", "low")
 STATES = ("yes", "likely", "possible", "no")

@@ -20,7 +20,7 @@ from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, w
 from per_obspy.report.summary.statements import event_sentences
 from per_obspy.report.summary.wording import ENGLISH, SPANISH
 from per_obspy.report.tally import PairTally
-from per_obspy.tables.coverage import Coverage, Search
+from per_obspy.results.coverage import Coverage, Search
 
 COVERAGE = Coverage(20, 16, {"no station within reach": 4})
 

@@ -1,0 +1,193 @@
+"""Risk table on disk: parts of an inventory joined, worst first, in bounded memory."""
+
+import json
+import shutil
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from importlib.metadata import version
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import duckdb
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from per_obspy.files import written_whole
+from per_obspy.inventory.files.text_cells import arrow_cells, header
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.inventory.suspicions import ODD
+from per_obspy.results.parts import bounded_database, joined_rows, joined_schema, text_columns
+from per_obspy.results.ranked_cells import count_values
+from per_obspy.results.ranked_table import ROWS, RankedTable, ranked_table
+from per_obspy.results.table_files import (
+    rounded_arrow,
+    rounded_table,
+    write_columns,
+    write_csv,
+    write_described,
+    write_parquet,
+    write_rejected,
+)
+from per_obspy.screening.codes import rule_columns
+from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.design import DESIGN
+
+
+class RiskFiles(NamedTuple):
+    """
+    Files of a risk table.
+
+    Attributes
+    ----------
+    files : list of Path
+        ``risk.parquet``, or one file per cell in ``risk/``; ``risk.csv`` and
+        ``risk.columns.csv``.
+    states : Counter
+        Number of pairs in each state.
+    stations : Counter
+        Number of pairs for which the record of each station is used.
+    """
+
+    files: list[Path]
+    states: Counter[str]
+    stations: Counter[str]
+
+
+def write_risk(
+    parts: Sequence[Path], folder: Path, facts: Mapping[str, str], csv_rows: int
+) -> RiskFiles:
+    """
+    Write ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``, in one pass over the parts.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        From :func:`~per_obspy.results.parts.write_part`, at least one.
+    folder : Path
+        Folder of the files.
+    facts : mapping of str to str
+        Facts of the whole table that the Parquet file states, for example whether the motion is
+        simulated.
+    csv_rows : int
+        Number of rows of ``risk.csv``, the worst ones.
+    """
+    names = ("risk.parquet", "risk.csv", "risk.columns.csv")
+    table, text, columns = files = [folder / name for name in names]
+    # Schema of the parts, and of the table
+    schema = joined_schema(parts)
+    whole = ranked_schema(schema, facts)
+    with written_whole(table) as part, written_whole(text) as lines:
+        states, stations = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
+    write_columns(whole.names, columns)
+    return RiskFiles(files, states, stations)
+
+
+def ranked_schema(schema: pa.Schema, facts: Mapping[str, str]) -> pa.Schema:
+    """Return the schema of a ranked table: the rank before the other columns, and its facts."""
+    statement = json.dumps({"version": version("per_obspy"), **facts})
+    return pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
+
+
+def _write_rows(
+    rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int
+) -> tuple[Counter[str], Counter[str]]:
+    """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
+    states, stations, first = Counter[str](), Counter[str](), next(rows)
+    dictionaries = text_columns(first.schema)
+    text.write_text(header(first.column_names), encoding="utf-8")
+    with (
+        bounded_database(table.parent) as database,
+        pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
+    ):
+        for piece in chain([first], rows):
+            writer.write_table(piece)
+            count_values(piece["state"], states)
+            count_values(piece["station"], stations)
+            # Rows whose rank is at most the number of rows of the text
+            before = piece["rank"][0].as_py() - 1
+            if before < csv_rows:
+                _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
+    return states, stations
+
+
+def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:
+    """Yield the rows of all parts, worst first, with their rank from 1."""
+    before = 0
+    for rows in joined_rows(parts, schema, ROWS):
+        rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
+        yield pa.table([rank, *rows.columns], schema=whole)
+        before += rows.num_rows
+
+
+def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
+    """Append rounded rows to a CSV file with a header."""
+    # Names of columns may differ in case only, or be anything: the database numbers them
+    numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
+    # It writes a separate file, which is appended to the others
+    piece = path.with_suffix(".piece")
+    database.register("piece", numbered)
+    try:
+        query = "COPY piece TO $path (FORMAT csv, HEADER false)"
+        database.execute(query, {"path": str(piece)})
+        with path.open("ab") as whole, piece.open("rb") as lines:
+            shutil.copyfileobj(lines, whole)
+    finally:
+        database.unregister("piece")
+        piece.unlink(missing_ok=True)
+
+
+def write_worst(table: Path, rows: int, path: Path) -> None:
+    """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
+    with ranked_table([table]) as ranked:
+        write_worst_rows(ranked, rows, path, ranked.schema.names)
+
+
+def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[str] = ()) -> None:
+    """
+    Write the worst rows of a ranked table as CSV.
+
+    Parameters
+    ----------
+    table : RankedTable
+        The table.
+    rows : int
+        Largest number of rows.
+    path : Path
+        The file.
+    own : collection of str
+        Columns of numbers that are rounded besides those that the package defines.
+    """
+    with bounded_database(path.parent) as database, written_whole(path) as part:
+        part.write_text(header(table.schema.names), encoding="utf-8")
+        for piece in table.ranked(rows):
+            _append_csv(database, rounded_arrow(piece, own), part)
+
+
+FILES = ("design.csv", "design.parquet", "design.columns.csv", "rejected.csv")
+
+
+def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
+    """
+    Write the files of a screening by a design spectrum, and return their paths.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From :func:`per_obspy.screening.design.design_table`.
+    folder : Path
+        Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
+    """
+    text, whole, columns, rejected = paths = [folder / name for name in FILES]
+    odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
+    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns() | {ODD: odd}
+    write_csv(rounded_table(table, own=known), text)
+    write_parquet(table, whole)
+    # Columns of the pair table that are not computed here are carried through
+    carried = Column("", "", "", "carried through from the pair table")
+    described = (known.get(name, carried)._replace(name=name) for name in map(str, table))
+    write_described(described, columns)
+    write_rejected(table.attrs["rejected"], rejected)
+    return paths

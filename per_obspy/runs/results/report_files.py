@@ -1,0 +1,433 @@
+"""Files of a report of any screening: its table is read once, then each file is written."""
+
+import csv
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Totals
+from per_obspy.errors import CatalogError, PerError
+from per_obspy.files import remove_file
+from per_obspy.report.layers.kml import ROWS as KML_ROWS
+from per_obspy.report.layers.kml import write_kml
+from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
+from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
+from per_obspy.report.overview import draw_overview
+from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
+from per_obspy.report.page.map_lines import lines_around, read_outlines
+from per_obspy.report.page.packing import MOST_COLUMNS
+from per_obspy.report.page.texts import LANGUAGES, Language
+from per_obspy.report.results import Results
+from per_obspy.report.summary.one_page import write_page as write_summary_page
+from per_obspy.report.summary.spoken_text import write_text
+from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
+from per_obspy.results.ranked_table import table_name
+from per_obspy.results.station_summary import COLUMNS as STATION_COLUMNS
+from per_obspy.results.totals import (
+    CountedTotals,
+    RegionTotals,
+    areas_of,
+    piece_totals,
+    region_totals,
+    totals_columns,
+    with_buildings,
+    write_totals,
+)
+from per_obspy.screening.columns import column_table, known_column
+from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+
+#: Pairs that a figure shows, evenly from all of them: marks of more would cover each other.
+SHOWN = 20_000
+
+#: Columns of the pairs that a figure shows, as far as the table has them.
+SHOWN_COLUMNS = ["rank", "pair_id", "risk_class", "longitude", "latitude", "demand", "gap"]
+
+#: Columns of the pairs whose pounding was observed.
+OBSERVED_COLUMNS = ["observed", "state", "probability"]
+
+#: Columns of the pairs that summary and KML list; those that a table lacks are left out.
+LISTED_COLUMNS = (
+    "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
+    "impact_velocity_84", "expected_amplification", "gap", "demand", "demand_rule", "station",
+    "distance", "flags", "derived", "missing_gap", "longitude", "latitude", "longitude_1",
+    "latitude_1", "longitude_2", "latitude_2",
+)  # fmt: skip
+
+#: Column of the neighbours of a building that can hit it.
+HIT = "neighbours_that_can_hit"
+
+
+class Report(NamedTuple):
+    """
+    Files that the report has written.
+
+    Attributes
+    ----------
+    outputs : list of Path
+        Its files.
+    faults : list of str
+        Figures and layers that could not be made, each with the reason.
+    """
+
+    outputs: list[Path]
+    faults: list[str]
+
+    @contextmanager
+    def tried(self, *paths: Path) -> Iterator[None]:
+        """Note the files that a block writes, or one line on the fault that prevents them."""
+        try:
+            yield
+        except (PerError, OSError, MemoryError):
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a library has against a picture
+            # Pictures of an earlier table are none of this one
+            for path in paths:
+                remove_file(path)
+            reason = " ".join(str(error).split())
+            self.faults.append(f"{paths[0]}: cannot be drawn: {type(error).__name__} {reason:.200}")
+        else:
+            self.outputs.extend(paths)
+
+
+class TableReader:
+    """
+    Summaries of a ranked table that is read once, in pieces.
+
+    Parameters
+    ----------
+    classes : sequence of str
+        Names of the risk classes, worst first.
+    totals : Totals
+        Areas by which the pairs are counted.
+    pairs : int
+        Rows of the table.
+    is_whole : bool
+        Whether the pieces have all columns, so that the worst pairs of the page are taken from
+        them.
+
+    Attributes
+    ----------
+    tally : PairTally
+        Counts of all pairs.
+    recorded : int or None
+        Rank of the worst pair that has a record; None if no pair has one.
+    """
+
+    def __init__(
+        self, classes: Sequence[str], totals: Totals, pairs: int, is_whole: bool = True
+    ) -> None:
+        self.tally = PairTally(classes)
+        # Settings, then the summaries of the pieces
+        self.totals, self.pairs, self.is_whole = totals, pairs, is_whole
+        self.recorded: int | None = None
+        self._classes = [*classes, UNKNOWN_CLASS]
+        self._counted = CountedTotals()
+        self._listed = list[pd.DataFrame]()
+        self._shown = list[pd.DataFrame]()
+        self._observed = list[pd.DataFrame]()
+        self._worst = list[pd.DataFrame]()
+
+    def read(self, pieces: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
+        """Yield the pieces, and add each to the summaries."""
+        for piece in pieces:
+            self.add(piece)
+            yield piece
+
+    def add(self, piece: pd.DataFrame) -> None:
+        """Take some rows."""
+        rank = piece["rank"].to_numpy()
+        if self.is_whole:
+            # The page holds the worst pairs, with all columns for its export
+            kept = piece.head(max(PAGE_PAIRS - self.tally.pairs, 0))
+            names = [str(name) for name in kept if name != "area"][: 2 * MOST_COLUMNS]
+            self._worst.append(with_areas(kept[names], kept, self.totals))
+        self.tally.add(piece)
+        self._counted.append(piece_totals(piece, self.totals, self._classes))
+        self._listed.append(piece[piece["rank"] <= SHEET_ROWS])
+        # Figures show all pairs of a small table, every tenth or so of a large one
+        step = -(-self.pairs // SHOWN)
+        columns = [name for name in SHOWN_COLUMNS if name in piece]
+        self._shown.append(piece.loc[rank % step == 1 % step, columns])
+        self._add_recorded(piece)
+
+    def _add_recorded(self, piece: pd.DataFrame) -> None:
+        """Take the rows whose pounding was observed, and the first one with a record."""
+        # Pieces come in any order
+        if "station" in piece and (piece["station"] != "").any():
+            first = int(piece.loc[piece["station"] != "", "rank"].iloc[0])
+            self.recorded = min(first, self.recorded or first)
+        if set(OBSERVED_COLUMNS) <= set(piece):
+            self._observed.append(piece.loc[piece["observed"].notna(), OBSERVED_COLUMNS])
+
+    def region_totals(self, folder: Path) -> RegionTotals:
+        """Return the totals of all rows, with the buildings of each area where they are known."""
+        totals = region_totals(self._counted, self.totals)
+        return totals._replace(table=with_buildings(totals.table, folder / "buildings.parquet"))
+
+    @property
+    def listed(self) -> pd.DataFrame:
+        """Return the worst rows, as many as a workbook has."""
+        return _joined(self._listed).sort_values("rank", ignore_index=True)
+
+    @property
+    def shown(self) -> pd.DataFrame:
+        """Return the pairs that a figure shows."""
+        return _joined(self._shown).sort_values("rank", ignore_index=True)
+
+    @property
+    def observed(self) -> pd.DataFrame:
+        """Return the pairs whose pounding was observed."""
+        return _joined(self._observed)
+
+    @property
+    def worst(self) -> pd.DataFrame:
+        """Return the worst pairs, if the pieces have all columns."""
+        return _joined(self._worst)
+
+
+def _joined(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return pieces as one table, empty without a piece."""
+    return pd.concat(pieces, ignore_index=True) if pieces else pd.DataFrame({"rank": []})
+
+
+def needed_columns(totals: Totals) -> list[str]:
+    """Return the columns of a risk table that a report without layers and workbook needs."""
+    figures = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, *totals_columns(totals), *COUNTED]
+    return list(dict.fromkeys([*LISTED_COLUMNS, *figures]))
+
+
+def with_areas(pairs: pd.DataFrame, rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
+    """Return pairs of the page with the areas of the rows that they come from."""
+    return pairs.assign(area=areas_of(rows, totals, totals.area or ""))
+
+
+def outlines_beside(*pairs: Path | None) -> Path | None:
+    """Return the first file of outlines that lies next to one of these pair tables, if any."""
+    for table in pairs:
+        if table is not None and (beside := table.with_suffix(".buildings.parquet")).is_file():
+            return beside
+    return None
+
+
+def read_table(
+    results: Results,
+    reader: TableReader,
+    pieces: Iterator[pd.DataFrame],
+    folder: Path,
+    outlines: Path | None,
+    geopackage: bool,
+    report: Report,
+) -> Results:
+    """
+    Read a ranked table once, write its layers and totals, and return the results with its rows.
+
+    Parameters
+    ----------
+    results : Results
+        Everything that is not in the table.
+    reader : TableReader
+        Takes the pieces.
+    pieces : iterator of DataFrame
+        Rows of the table, worst first.
+    folder : Path
+        Of the results.
+    outlines : Path or None
+        Outlines of the buildings, from :func:`outlines_beside`.
+    geopackage : bool
+        Whether the layers are written.
+    report : Report
+        Takes files and faults.
+
+    Raises
+    ------
+    CatalogError
+        If the table ends too early.
+    """
+    rows = reader.read(pieces)
+    if geopackage:
+        names = (f"{results.stem}.{suffix}" for suffix in ("gpkg", "qgz", "geoparquet"))
+        package, project, parquet = (folder / name for name in names)
+        with report.tried(package, project, parquet):
+            _write_layers(rows, results, reader, outlines, (package, project, parquet))
+    # All rows, or those that a layer left when it failed; a table that fails is a fault
+    deque(rows, maxlen=0)
+    if reader.tally.pairs != reader.pairs:
+        table = folder / table_name(folder, results.stem)
+        raise CatalogError(str(table), "cannot be read to its end: run again")
+    areas = reader.region_totals(folder).table
+    write_totals(areas, folder / "totals.csv")
+    report.outputs.append(folder / "totals.csv")
+    buildings, hit = _worst_buildings(folder / "buildings.parquet")
+    # The pairs of the page have all columns
+    return replace(
+        results,
+        tally=reader.tally,
+        worst=reader.worst if reader.is_whole else results.worst,
+        listed=reader.listed,
+        shown=reader.shown,
+        areas=areas,
+        buildings=buildings,
+        buildings_hit=hit,
+    )
+
+
+def _write_layers(
+    rows: Iterator[pd.DataFrame],
+    results: Results,
+    reader: TableReader,
+    outlines: Path | None,
+    files: tuple[Path, Path, Path],
+) -> None:
+    """Write all layers, with the optional libraries; totals are known after the last piece."""
+    from per_obspy.report.layers.map_layers import MapSources, write_layers
+
+    region, folder = results.region, files[0].parent
+    facts = {"name": region.title, "simulated": str(region.simulated).lower()}
+    ranked = folder / "buildings.parquet"
+    totals = partial(reader.region_totals, folder)
+    sources = MapSources(region.classes, facts, results.stations, totals, ranked, outlines)
+    write_layers(rows, sources, files)
+
+
+def _worst_buildings(path: Path) -> tuple[pd.DataFrame, int | None]:
+    """Return the worst buildings, and how many of all a neighbour can hit, as far as known."""
+    if not path.is_file():
+        return pd.DataFrame(), None
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
+        first = next(file.iter_batches(PAGE_PAIRS), None)
+        if first is None:
+            return pd.DataFrame(), None
+        # Counted in all rows: the page shows the worst only
+        hit = _count_hit(file) if HIT in file.schema_arrow.names else None
+    return first.to_pandas(), hit
+
+
+def _count_hit(file: pq.ParquetFile) -> int:
+    """Return the number of buildings that a neighbour can hit."""
+    batches = file.iter_batches(columns=[HIT])
+    return sum(
+        int(np.count_nonzero(batch[HIT].to_numpy(zero_copy_only=False) > 0)) for batch in batches
+    )
+
+
+def write_files(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
+    """
+    Write summary, KML and workbook; a file that fails leaves the others.
+
+    Parameters
+    ----------
+    results : Results
+        From :func:`read_table`.
+    folder : Path
+        Of the results.
+    spreadsheet : bool
+        Whether a workbook is written, for which an optional library is needed.
+    report : Report
+        Takes files and faults.
+    """
+    stem, region = results.stem, results.region
+    # Words first
+    with report.tried(folder / "summary.txt"):
+        write_text(results, folder / "summary.txt")
+    with report.tried(folder / "summary.pdf"):
+        write_summary_page(results, folder / "summary.pdf")
+    with report.tried(folder / f"{stem}.kml"):
+        note = _extent(results, folder, KML_ROWS)
+        write_kml(results.listed, region.classes, region.title, folder / f"{stem}.kml", note)
+    if spreadsheet:
+        with report.tried(folder / f"{stem}.xlsx"):
+            sheets = _sheets(results, _extent(results, folder, SHEET_ROWS))
+            write_workbook(sheets, folder / f"{stem}.xlsx")
+
+
+def write_overview(results: Results, folder: Path, report: Report) -> None:
+    """Draw the map of all pairs."""
+    overview = folder / "figures" / "overview.png"
+    with report.tried(overview):
+        draw_overview(results.shown, results.region, overview)
+
+
+def _extent(results: Results, folder: Path, most: int) -> str:
+    """Return a sentence on the number of pairs in a file, and on the table with all pairs."""
+    pairs = results.tally.pairs
+    if pairs <= most:
+        return f"All {pairs} pairs."
+    table = table_name(folder, results.stem)
+    return f"The worst {most} of {pairs} pairs; all of them are in {table}."
+
+
+def _sheets(results: Results, note: str) -> list[Sheet]:
+    """Return the sheets of the workbook."""
+    worst, areas, buildings = results.listed, results.areas, results.buildings
+    # Units are those of the tables
+    columns = {str(name): known_column(str(name)) for name in worst}
+    units = {name: column.unit for name, column in columns.items() if column is not None}
+    of_stations = {name: column.unit for name, column in STATION_COLUMNS.items()}
+    # What every column means is a sheet too
+    sheets = [
+        Sheet("pairs", worst, units, results.own),
+        Sheet("contents", pd.DataFrame({"sheet": ["pairs"], "content": [note]}), {}),
+        Sheet("buildings", buildings, {"severity": "m/s"}, buildings.columns),
+        Sheet("areas", areas, {"worst_expected_impact_velocity": "m/s"}, areas.columns),
+        Sheet("stations", results.stations, of_stations, results.stations.columns),
+        Sheet("columns", column_table(map(str, worst)), {}),
+    ]
+    return [sheet for sheet in sheets if not sheet.table.empty]
+
+
+def with_page_data(results: Results, folder: Path, outlines: Path | None) -> Results:
+    """Return results with rejections, outlines and coast lines for the page."""
+    rejected, rejections = _rejected(folder / "rejected.csv")
+    worst, rings = results.worst, list[tuple[str, list[float]]]()
+    # Outlines of the buildings of these pairs, if the pairs came with them
+    if outlines is not None and "building_id_1" in worst:
+        names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
+        rings = read_outlines(outlines, names.unique().tolist())
+    return replace(
+        results,
+        rejected=rejected,
+        rejections=rejections,
+        outlines=rings,
+        lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
+    )
+
+
+def _column(table: pd.DataFrame, name: str) -> FloatArray:
+    """Return a column of numbers, empty if the table lacks it."""
+    return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
+
+
+def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
+    """Return the first rows of the table of rejections, and its number of rows."""
+    # Line by line: rejections of a large inventory are many
+    rows, count = list[list[str]](), 0
+    if path.is_file():
+        with path.open(encoding="utf-8", newline="") as file:
+            lines = csv.reader(file)
+            next(lines, None)
+            for row in lines:
+                count += 1
+                if count <= MOST_ROWS and len(row) == len(REJECTED_COLUMNS):
+                    rows.append(row)
+    return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
+
+
+def made_with(language: Language) -> tuple[str, str]:
+    """Return the software version as title and text of the provenance."""
+    return LANGUAGES[language]["made_with"], f"per_obspy {version('per_obspy')}"
+
+
+def content_note(notes: Sequence[str], language: Language) -> list[tuple[str, str]]:
+    """Return sentences on the content of the page as a row of its provenance."""
+    return [(WORDING[language]["page_content"], " ".join(notes))] if notes else []

@@ -1,0 +1,257 @@
+"""Second stage: pairs and the stations become the risk table, chunk by chunk."""
+
+import math
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import pyarrow.parquet as pq
+
+from per_obspy.config import Run
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.files.raw_rows import RawRows
+from per_obspy.inventory.files.reading import PairChunk, PairInventory
+from per_obspy.results.coverage import Coverage, CoverageTally
+from per_obspy.results.risk import RiskFiles, write_risk
+from per_obspy.results.table_files import write_rejected
+from per_obspy.runs.building_rows import NO_ROWS, BuildingRowsDone, building_rows
+from per_obspy.runs.losses import areas_left_out, search_of_tables
+from per_obspy.runs.pairs import pair_files
+from per_obspy.runs.provenance import RunContext
+from per_obspy.runs.results.served_stations import Served
+from per_obspy.runs.stations import simulated_motion
+from per_obspy.runs.tasks.chunk import CHUNK, ChunkJob, do_chunks
+from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
+from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
+from per_obspy.runs.tasks.risk_cells import WORK, write_cells, write_texts
+from per_obspy.runs.tasks.station import FinishedStation
+from per_obspy.screening.ranking import EVERY_STATE
+
+#: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
+CHUNKS_PER_WORKER = 4
+
+#: Rows of a chunk at least: preparing the records of 24 stations anew takes as long as 3 000 rows
+#: with estimates.
+SMALLEST_CHUNK = 10_000
+
+KINDS = ("file", "record", "station", "service", "pair", "building", "row")
+
+
+class PairNotes(NamedTuple):
+    """
+    Sentences about the pair tables of a run.
+
+    Attributes
+    ----------
+    recognised : tuple of str
+        How each table that is not plain is read.
+    suspicions : tuple of str
+        Sentences on what is possible but odd: rows, columns, pairs and buildings given twice.
+    """
+
+    recognised: tuple[str, ...] = ()
+    suspicions: tuple[str, ...] = ()
+
+    def as_record(self) -> dict[str, list[str]]:
+        """Return the sentences for ``run.json``."""
+        return {name: list(texts) for name, texts in self._asdict().items()}
+
+
+class Screened(NamedTuple):
+    """
+    Result of the screening.
+
+    Attributes
+    ----------
+    outputs : list of Path
+        The files.
+    counts : dict
+        Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
+    served : Served
+        Numbers of pairs and buildings for which the record of each station is used.
+    unplaced : tuple of Rejection
+        Stations that serve no pair because their place is unknown.
+    failed : bool
+        Whether the work of a chunk failed unexpectedly.
+    pair_tables : PairNotes
+        Sentences on the recognised form of the pair tables, and on what is odd in them.
+    coverage : Coverage
+        Rows of the pair tables, and those that are left out.
+    """
+
+    outputs: list[Path]
+    counts: dict[str, int]
+    served: Served
+    unplaced: tuple[Rejection, ...]
+    failed: bool
+    pair_tables: PairNotes
+    coverage: Coverage
+
+
+def screened(
+    context: RunContext, stations: Sequence[FinishedStation], rejected: Iterable[Rejection]
+) -> Screened:
+    """
+    Write the risk table and the rejections of an inventory of any size.
+
+    Parameters
+    ----------
+    context : RunContext
+        The run.
+    stations : sequence of FinishedStation
+        With station files; if there is none and no ShakeMap, only ``rejected.csv`` is written.
+    rejected : iterable of Rejection
+        Rejections of the earlier stages.
+
+    Raises
+    ------
+    CatalogError
+        If the inventory is wrong as a whole.
+    """
+    settings, folder = context.settings, context.folder
+    maps = shakemap_files(settings)
+    ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
+    # Pairs need a station or a map
+    screens = _parts if stations or maps else _no_parts
+    parts, notes, tally = screens(context, ground)
+    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    outputs = [folder / "rejected.csv"]
+    # The parts of the chunks become one table, worst pair first
+    if any(part.path for part in parts):
+        facts = _facts(settings, stations)
+        files, states, served = _ranked(context, parts, facts)
+        # Rows of buildings are read from it
+        rows = building_rows(context, ground, facts)
+        outputs += files + rows.outputs
+    left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
+    counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
+    return Screened(
+        outputs,
+        counts,
+        Served(served, rows.served),
+        unplaced,
+        rows.failed or _any_failed(parts),
+        notes,
+        tally.coverage(counts),
+    )
+
+
+def _ranked(context: RunContext, parts: Sequence[Part], facts: dict[str, str]) -> RiskFiles:
+    """Write the risk table of all parts, in one file or one per cell."""
+    settings, folder = context.settings, context.folder
+    tables = [part.path for part in parts if part.path]
+    pairs = sum(pq.read_metadata(table.absolute()).num_rows for table in tables)
+    if pairs >= settings.dataset_from:
+        risk = write_cells(parts, folder, facts, settings.dataset_cell, context.workers)
+        texts = write_texts(risk.files, folder, settings.csv_rows)
+        return risk._replace(files=[*risk.files, *texts])
+    context.progress("ranking", 0, 1)
+    risk = write_risk(tables, folder, facts, settings.csv_rows)
+    # Cells that a killed run has begun are of no use
+    shutil.rmtree(folder / WORK, ignore_errors=True)
+    context.progress("ranking", 1, 1)
+    return risk
+
+
+def _any_failed(parts: Sequence[Part]) -> bool:
+    """Return whether the work of a chunk failed unexpectedly."""
+    return any(part.failed for part in parts)
+
+
+def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
+    """Return name and origin of the motion as texts of a table."""
+    is_simulated = simulated_motion(settings, stations)
+    return {"name": settings.name, "simulated": str(is_simulated).lower()}
+
+
+def _counts(
+    states: Counter[str], kinds: Counter[str], parts: Sequence[Part], rows: BuildingRowsDone
+) -> dict[str, int]:
+    """Return the numbers of pairs, of rejections of each kind, of chunks, and those of rows."""
+    counts = {"pairs": states.total()}
+    counts |= {state: states[state] for state in EVERY_STATE}
+    counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
+    counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    return counts | rows.counts
+
+
+def shakemap_files(settings: Run) -> tuple[Path, ...]:
+    """Return the files of the ShakeMap, none if there is no map."""
+    records = settings.records
+    maps = (records.shakemap, records.shakemap_uncertainty) if records else ()
+    return tuple(path for path in maps if path)
+
+
+def _parts(context: RunContext, ground: GroundFiles) -> tuple[list[Part], PairNotes, CoverageTally]:
+    """Compute the chunks, and return the parts in order, sentences and what is left out."""
+    settings, folder, progress = context.settings, context.folder, context.progress
+    inventory = _inventory(settings, folder, ground)
+    progress("screening", 0, inventory.count)
+    # Rows are counted as chunks are finished, in whichever order
+    parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
+    tally = CoverageTally(search_of_tables(inventory.rows))
+    size = _chunk_rows(inventory.count, context.workers.count)
+    jobs = _jobs(settings, folder, ground, inventory.chunks(size), raw)
+    for part in do_chunks(jobs, context.workers):
+        parts.append(part)
+        rows += part.rows
+        # What is left out is read back chunk by chunk, never as a whole
+        lost, block = list(rejections([part])), raw.pop(part.number)
+        tally.add(lost, areas_left_out(settings.totals, lost, block))
+        progress("screening", min(rows, inventory.count), inventory.count)
+    remove_other_parts(_chunk_folder(folder), parts)
+    # Findings about the tables, after all their rows were read
+    return sorted(parts, key=lambda part: part.number), _notes(inventory), tally
+
+
+def _no_parts(*_: object) -> tuple[list[Part], PairNotes, CoverageTally]:
+    """Return what is screened without any ground motion."""
+    return [], PairNotes(), CoverageTally()
+
+
+def _notes(inventory: PairInventory) -> PairNotes:
+    """Return the sentences on pair tables whose rows were read."""
+    return PairNotes(tuple(inventory.recognised()), tuple(inventory.suspicions.sentences()))
+
+
+def _inventory(settings: Run, folder: Path, ground: GroundFiles) -> PairInventory:
+    """Open the pair tables of a run."""
+    form = settings.pairs.form if settings.pairs else None
+    inventory = PairInventory(pair_files(settings, folder, ground.stations), form)
+    area = settings.totals.area
+    if area and area not in inventory.names:
+        raise CatalogError("totals", f"area: the pair table has no column {area!r}")
+    return inventory
+
+
+def _chunk_rows(count: int, workers: int) -> int:
+    """
+    Return the rows of a chunk of an inventory of so many rows.
+
+    They are the smallest number times a power of two, so that finished chunks stay what they are
+    when an inventory grows a little.
+    """
+    share = max(count / (CHUNKS_PER_WORKER * workers), SMALLEST_CHUNK)
+    return min(SMALLEST_CHUNK << round(math.log2(share / SMALLEST_CHUNK)), CHUNK)
+
+
+def _jobs(
+    settings: Run,
+    folder: Path,
+    ground: GroundFiles,
+    chunks: Iterator[PairChunk],
+    raw: dict[int, RawRows],
+) -> Iterator[ChunkJob]:
+    """Yield one job per chunk of the inventory, and keep its rows until it is done."""
+    for number, chunk in enumerate(chunks):
+        raw[number] = chunk.rows
+        part = _chunk_folder(folder) / f"{number:06}.parquet"
+        yield ChunkJob(number, chunk, ground, settings.building, settings.screening, part)
+
+
+def _chunk_folder(folder: Path) -> Path:
+    """Return the folder of the parts."""
+    return folder / "chunks"

@@ -1,0 +1,172 @@
+"""Ground motion of a region as files and small tables, each read once per process."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from per_obspy.config import Interpolation
+from per_obspy.errors import MachineFault, Rejection
+from per_obspy.files import bytes_hash, file_hash
+from per_obspy.records.shakemap import read_shakemap
+from per_obspy.runs.tasks.station import FinishedStation
+from per_obspy.screening.assignment import Stations, site_class_of
+from per_obspy.screening.site_motion import (
+    RegionalMotion,
+    StationField,
+    hypocentre_of,
+    prepared_field,
+)
+from per_obspy.spectra.storage import read_spectra
+
+#: Stations that a worker keeps in memory, each of about 2 MB.
+STATIONS_KEPT = 200
+
+
+class StationFile(NamedTuple):
+    """
+    A station that can serve pairs.
+
+    Attributes
+    ----------
+    name : str
+        ``NETWORK.STATION``.
+    longitude, latitude : float
+        Degrees east and north.
+    site_class : str
+        Of the ground, empty if unknown.
+    shard : Path
+        Its Dataset.
+    hash : str
+        Of the station file.
+    flags : str
+        Of its record, those of the comparison with other stations included.
+    """
+
+    name: str
+    longitude: float
+    latitude: float
+    site_class: str
+    shard: Path
+    hash: str
+    flags: str = ""
+
+
+class GroundFiles(NamedTuple):
+    """
+    Ground motion of a region, for other processes to read.
+
+    Attributes
+    ----------
+    stations : tuple of StationFile
+        Stations that can serve pairs.
+    field : StationField or None
+        The motion between them; None if there are none.
+    shakemap : tuple of Path
+        ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
+    key : str
+        Hash of all their contents.
+    """
+
+    stations: tuple[StationFile, ...]
+    field: StationField | None
+    shakemap: tuple[Path, ...]
+    key: str
+
+
+def ground_files(
+    stations: Iterable[FinishedStation], shakemap: tuple[Path, ...], settings: Interpolation
+) -> tuple[GroundFiles, tuple[Rejection, ...]]:
+    """
+    Describe the ground motion by finished stations and a ShakeMap; no station file is opened.
+
+    Parameters
+    ----------
+    stations : iterable of FinishedStation
+        With station files.
+    shakemap : tuple of Path
+        Files of the ShakeMap, empty if there is none.
+    settings : Interpolation
+        For the motion between the stations.
+
+    Returns
+    -------
+    ground : GroundFiles
+    rejected : tuple of Rejection
+        Stations without coordinates.
+    """
+    files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
+    # Pairs are given stations by distance
+    for station in stations:
+        file, dataset = _station_file(station)
+        if np.isfinite(file.longitude):
+            files.append(file)
+            spectra.append(dataset)
+        else:
+            reason = "its coordinates are unknown: it serves no pair"
+            rejected.append(Rejection("station", file.name, "", None, (reason,)))
+
+    # Motion between the stations, which recorded the same earthquake
+    hypocentre = hypocentre_of([dataset.attrs for dataset in spectra])
+    field = prepared_field(spectra, settings, hypocentre) if spectra else None
+    # Everything that decides the motion at a pair
+    contents = [(file.name, file.hash, file.flags) for file in files]
+    known = [*contents, *map(file_hash, shakemap), hypocentre]
+    key = bytes_hash(repr(known).encode())
+    return GroundFiles(tuple(files), field, shakemap, key), tuple(rejected)
+
+
+def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
+    """Return name, place and ground of a station with its spectra."""
+    spectra, shard = station.spectra, station.shard
+    assert spectra is not None  # stations without a station file serve no pair
+    assert shard is not None
+    name, longitude, latitude = (
+        spectra[key].item() for key in ("station", "longitude", "latitude")
+    )
+    site_class = site_class_of(spectra)
+    flags = str(spectra["record_flags"].item()) if "record_flags" in spectra else ""
+    file = StationFile(name, longitude, latitude, site_class, shard, station.hash, flags)
+    return file, spectra
+
+
+def read_ground(files: GroundFiles) -> RegionalMotion:
+    """Return the ground motion of a region; each station is read at its first use."""
+    places = [(file.longitude, file.latitude) for file in files.stations]
+    longitude, latitude = np.array(places).reshape(-1, 2).T
+    names = np.array([file.name for file in files.stations], dtype=object)
+    classes = np.array([file.site_class for file in files.stations], dtype=object)
+    # Stations and the map stay in memory from one chunk to the next
+    stations = Stations(
+        names, longitude, latitude, classes, lambda index: _flagged_station(files.stations[index])
+    )
+    shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
+    return RegionalMotion(stations, files.field, shakemap)
+
+
+@lru_cache(1)
+def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
+    """Read a ShakeMap, cached by the key of the ground motion."""
+    del key
+    return read_shakemap(*files)
+
+
+@lru_cache(STATIONS_KEPT)
+def read_station_once(shard: Path, digest: str) -> xr.Dataset:
+    """Read a station file, cached by its hash."""
+    content = shard.read_bytes()
+    # Its pairs are not at fault, and the next run makes the station file again
+    if bytes_hash(content) != digest:
+        raise MachineFault(f"{shard}: changed while the run read it")
+    return read_spectra(shard, content)
+
+
+def _flagged_station(file: StationFile) -> xr.Dataset:
+    """Read a station with the flags of the comparison with others, which its file does not have."""
+    station = read_station_once(file.shard, file.hash)
+    if not file.flags or file.flags == str(station["record_flags"].item()):
+        return station
+    return station.assign(record_flags=station["record_flags"].copy(data=file.flags))

@@ -1,0 +1,54 @@
+"""Compilation of all kernels in processes, so that no later command waits for them."""
+
+from collections.abc import Iterator
+
+from per_obspy.errors import Unfinished, WriteError
+from per_obspy.kernels._jit import can_be_stored
+from per_obspy.progress import Progress
+from per_obspy.runs.tasks.parallel import Work, Workers, results
+from per_obspy.screening.warmup import PARTS, compile_part
+
+#: Stage of the progress.
+COMPILING = "compiling kernels (once, one to two minutes)"
+
+#: Part that is compiled last: the kernels that only whole tables reach, which call those of the
+#: other parts.
+LAST = ("screening",)
+
+
+def compile_kernels(progress: Progress) -> None:
+    """
+    Compile all kernels that a command may need; compiled ones are only loaded.
+
+    Parameters
+    ----------
+    progress : callable
+        Called for every part.
+
+    Raises
+    ------
+    WriteError
+        If there is no folder in which they can be stored: every start would compile them again.
+    Unfinished
+        If a part cannot be compiled.
+    """
+    if not can_be_stored():
+        reason = "set NUMBA_CACHE_DIR to a folder that can be written"
+        raise WriteError("compiled kernels", reason)
+    total = len({*PARTS, *LAST})
+    progress(COMPILING, 0, total)
+    for done, _ in enumerate(_compiled(), start=1):
+        progress(COMPILING, done, total)
+
+
+def _compiled() -> Iterator[str]:
+    """Yield the names of the parts as they are compiled."""
+    work = Work(compile_part, _failed)
+    first = [name for name in PARTS if name not in LAST]
+    yield from results(first, work, Workers())
+    yield from results(LAST, work, Workers())
+
+
+def _failed(name: str, reason: str) -> str:
+    """Raise an error with the reason why a part cannot be compiled."""
+    raise Unfinished(f"kernels of {name} cannot be compiled: {reason}")

@@ -1,0 +1,447 @@
+"""
+Work on one station, from its records to its station file, independent of other stations.
+
+A station file is a netCDF file; its status file (:mod:`per_obspy.resume`) of the same name also
+holds the rejections and the decisions that depend on the earthquake. A station for which both are
+complete is not done again; one that another earthquake leaves as it is gets the new hypocentre.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from per_obspy.config import Processing, Spectra
+from per_obspy.errors import CatalogError, PerError, Rejection, TryLater, WrongOutput
+from per_obspy.files import bytes_hash, file_hash, remove_file
+from per_obspy.machine import raise_machine_fault
+from per_obspy.processing.account import taken
+from per_obspy.processing.chain import process_station
+from per_obspy.processing.earthquake import Source, same_decisions, source_of
+from per_obspy.records.earthquakes.quakeml import EventFile, portable
+from per_obspy.records.folder import read_station
+from per_obspy.records.metadata import metadata_text
+from per_obspy.resume import Status, StatusError, changed_outputs, read_status, write_status
+from per_obspy.runs.tasks.parallel import Work, Workers, results
+from per_obspy.spectra.station import station_spectra
+from per_obspy.spectra.storage import read_spectra, without_motion, write_spectra
+
+if TYPE_CHECKING:
+    from obspy import Inventory, Stream
+
+
+def hypocentre_attributes(file: EventFile | None) -> dict[str, float]:
+    """Return the hypocentre as attributes of a station file, degrees and m; empty if unknown."""
+    if file is None:
+        return {}
+    origin = file.event.preferred_origin() or next(iter(file.event.origins), None)
+    if not origin or None in (origin.longitude, origin.latitude, origin.depth):
+        return {}
+    return {
+        f"hypocentre_{name}": float(origin[name]) for name in ("longitude", "latitude", "depth")
+    }
+
+
+def source_of_job(event: EventFile | None, decisions: list[dict[str, Any]]) -> Source | None:
+    """Return the earthquake for the processing, which collects its decisions; None without one."""
+    if event is None or not event.event.origins:
+        return None
+    return source_of(event.event, decisions)
+
+
+def source_facts(event: EventFile | None) -> dict[str, object] | None:
+    """Return everything of an earthquake that can change a station, as plain values."""
+    if event is None:
+        return None
+    source = source_of(event.event)
+    return {
+        "time": source.time.ns,
+        "place": [source.latitude, source.longitude, source.depth],
+        "magnitude": source.magnitude,
+        "hypocentre": hypocentre_attributes(event),
+    }
+
+
+def is_of_event(status: Mapping[str, Any], event: EventFile, processing: Processing) -> bool:
+    """
+    Return whether the motion of a station is that which an earthquake gives.
+
+    Parameters
+    ----------
+    status : mapping
+        Content of the station's status file.
+    event : EventFile
+        The earthquake now.
+    processing : Processing
+        Settings of the station.
+    """
+    decisions = status.get("decisions")
+    if not isinstance(decisions, list) or not isinstance(status.get("source"), dict):
+        return False
+    return same_decisions(decisions, source_of(event.event), processing)
+
+
+def moved_shard(shard: Path, before: Mapping[str, Any], event: EventFile) -> bool:
+    """
+    Write the hypocentre of an earthquake into a station file unless it is there.
+
+    Parameters
+    ----------
+    shard : Path
+        Whole station file.
+    before : mapping
+        From :func:`source_facts`, of the earthquake for which it was written.
+    event : EventFile
+        The earthquake now.
+
+    Returns
+    -------
+    is_possible : bool
+        False if one of both hypocentres is unknown: that of the headers is in its place.
+    """
+    known, new = before.get("hypocentre"), hypocentre_attributes(event)
+    if known == new:
+        return True
+    if not known or not new:
+        return False
+    dataset = read_spectra(shard, shard.read_bytes()).drop_encoding()
+    dataset.attrs |= new
+    write_spectra(dataset, shard)
+    return True
+
+
+#: Suffix of a station file with spectra.
+SPECTRA = ".nc"
+
+
+class Products(NamedTuple):
+    """
+    Files made of the records of a station.
+
+    Attributes
+    ----------
+    rejected : tuple of Rejection
+        Rejected inputs, each with its reasons.
+    files : tuple of Path
+        The station file and all files written with it; empty without a usable record.
+    facts : mapping
+        Plain values that the status file holds besides.
+    """
+
+    rejected: tuple[Rejection, ...]
+    files: tuple[Path, ...] = ()
+    facts: Mapping[str, object] = MappingProxyType({})
+
+
+def spectra_shard(job: "StationJob", stream: "Stream", source: "Source | None") -> Products:
+    """Write the spectra of a station as its station file if any record is usable."""
+    clean, unfit = process_station(taken(stream), job.processing, source)
+    if not clean:
+        return Products(unfit)
+    # Spectra at periods in equal steps of their logarithm
+    grid = job.spectra
+    periods = np.geomspace(grid.shortest, grid.longest, grid.count)
+    dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
+    dataset.attrs |= hypocentre_attributes(job.event)
+    write_spectra(dataset, job.shard)
+    return Products(unfit, (job.shard,))
+
+
+class StationJob(NamedTuple):
+    """
+    One station to do.
+
+    Attributes
+    ----------
+    station : str
+        ``NETWORK.STATION``.
+    source : tuple of Path
+        Its waveform files.
+    inventory : Inventory or None
+        Its metadata.
+    event : EventFile or None
+        The earthquake.
+    processing, spectra : Processing, Spectra
+        Settings.
+    shard : Path
+        Where its Dataset goes.
+    hashes : tuple of str
+        Of the waveform files.
+    reader : partial
+        How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
+    product : callable
+        Function that makes the files from the records: see :func:`spectra_shard`.
+    key : str
+        Hash of all inputs of the station file but the earthquake; :func:`do_stations` computes it.
+    """
+
+    station: str
+    source: tuple[Path, ...]
+    inventory: "Inventory | None"
+    event: EventFile | None
+    processing: Processing
+    spectra: Spectra
+    shard: Path
+    hashes: tuple[str, ...] = ()
+    reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
+    product: "Callable[[StationJob, Stream, Source | None], Products]" = spectra_shard
+    key: str = ""
+
+
+class FinishedStation(NamedTuple):
+    """
+    Result of a station.
+
+    Attributes
+    ----------
+    station : str
+        ``NETWORK.STATION``.
+    shard : Path or None
+        Its Dataset; None if no usable record was left.
+    rejected : tuple of Rejection
+        Rejected inputs, each with its reasons.
+    resumed : bool
+        Whether an earlier run had processed it.
+    hash : str
+        Of the station file; empty if there is none.
+    spectra : Dataset or None
+        Content of a station file without the motion, so that no later stage reads it again.
+    failed : bool
+        Whether its work failed unexpectedly, so that the next run does it again.
+    """
+
+    station: str
+    shard: Path | None
+    rejected: tuple[Rejection, ...]
+    resumed: bool
+    hash: str = ""
+    spectra: xr.Dataset | None = None
+    failed: bool = False
+
+
+def do_stations(jobs: Sequence[StationJob], workers: Workers) -> Iterator[FinishedStation]:
+    """
+    Yield every station as it is finished, in parallel; finished parts of an earlier run are reused.
+
+    Parameters
+    ----------
+    jobs : sequence of StationJob
+        One job per station.
+    workers : Workers
+        Where to work.
+
+    Raises
+    ------
+    WriteError, WrongOutput
+        If a station file cannot be written.
+    Unfinished
+        After all other stations, if the machine failed at some.
+    """
+    missing = list[StationJob]()
+    # A key that cannot be computed costs its own station only
+    for job in results(jobs, Work(_prepared, _failed, _name), Workers(1)):
+        if isinstance(job, FinishedStation):
+            yield job
+            continue
+        earlier = _earlier(job)
+        if earlier is None:
+            missing.append(job)
+        else:
+            yield earlier
+    yield from results(missing, Work(do_station, _failed, _name), workers)
+
+
+def _prepared(job: StationJob) -> StationJob | FinishedStation:
+    """Return a job with its key, and with an event that can be sent to other processes."""
+    event = job.event and portable(job.event)
+    return job._replace(key=_key(job), event=event)
+
+
+def do_station(job: StationJob) -> FinishedStation:
+    """Write a station file and its status file, and return the finished station."""
+    if known := _unchanged_by_event(job):
+        return known
+    # Whatever an earlier run has left is of other inputs
+    remove_file(job.shard)
+    decisions = list[dict[str, Any]]()
+    products = _products(job, decisions)
+    has_shard = job.shard in products.files
+    digest, spectra = _read_shard(job.shard) if has_shard else ("", None)
+    # The status comes last: it is valid for whole files only
+    others = [file for file in products.files if file != job.shard]
+    outputs = {_from_status(job.shard, file): file_hash(file) for file in others}
+    outputs |= {job.shard.name: digest} if has_shard else {}
+    facts = {"shard": digest or None, "rejected": products.rejected, **products.facts}
+    facts |= {"source": source_facts(job.event), "decisions": decisions}
+    write_status(_status_file(job.shard), job.key, outputs, facts)
+    shard = job.shard if has_shard else None
+    return FinishedStation(job.station, shard, products.rejected, False, digest, spectra)
+
+
+def _unchanged_by_event(job: StationJob) -> FinishedStation | None:
+    """
+    Return the station of an earlier run for whose processing the earthquake is the same, else None.
+
+    Its files get the facts of the earthquake now.
+    """
+    status = _known_status(job)
+    if status is None or job.event is None:
+        return None
+    rejected = _stored_rejections(status)
+    found = FinishedStation(job.station, job.shard, rejected, True)
+    if not is_of_event(status, job.event, job.processing) or not _whole_station(found, status):
+        return None
+    # The hypocentre is part of a station file with spectra
+    shard = status["shard"]
+    if shard and job.shard.suffix == SPECTRA:
+        if not moved_shard(job.shard, status["source"], job.event):
+            return None
+        shard = file_hash(job.shard)
+    # As if the station had been done with this earthquake at first
+    outputs = {**status["outputs"], **({job.shard.name: shard} if shard else {})}
+    rest = {name: fact for name, fact in status.items() if name not in ("key", "outputs")}
+    facts = {**rest, "shard": shard, "source": source_facts(job.event)}
+    status = write_status(_status_file(job.shard), job.key, outputs, facts)
+    return _whole_station(found, status)
+
+
+def _products(job: StationJob, decisions: list[dict[str, Any]]) -> Products:
+    """Read the records of a station and make its products; an unusable station is a rejection."""
+    source = _file_names(job)
+    try:
+        stream, unread = job.reader(job.source, job.inventory, job.station)
+        products = job.product(job, stream, source_of_job(job.event, decisions))
+    except (TryLater, WrongOutput):
+        raise  # no property of the station
+    except PerError as error:
+        raise_machine_fault(error)
+        reasons = getattr(error, "reasons", None) or (str(error),)
+        return Products((Rejection("station", job.station, source, None, tuple(reasons)),))
+    # Records that name no file came from all files of the station
+    unfit = [row if row.source else row._replace(source=source) for row in products.rejected]
+    return products._replace(rejected=(*unread, *unfit))
+
+
+def _file_names(job: StationJob) -> str:
+    """Return the names of a station's files, as rejections give them."""
+    return ", ".join(path.name for path in job.source)
+
+
+def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Dataset | None]:
+    """Return hash and spectra of a station file, opened once; no spectra if its hash differs."""
+    if shard.suffix != SPECTRA:
+        return file_hash(shard), None
+    content = shard.read_bytes()
+    digest = bytes_hash(content)
+    if digest != (expected or digest):
+        return digest, None
+    return digest, without_motion(read_spectra(shard, content))
+
+
+def _status_file(shard: Path) -> Path:
+    """Return the status file of a station file."""
+    return shard.with_suffix(".json")
+
+
+def _from_status(shard: Path, file: Path) -> str:
+    """Return the path of an output relative to the folder of the status file."""
+    return Path(os.path.relpath(file, shard.parent)).as_posix()
+
+
+def _key(job: StationJob) -> str:
+    """Return the hash of all inputs of the products of a station but the earthquake."""
+    settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
+    files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
+    files += ["with an earthquake"] if job.event else []
+    # Reader and product are known by name, so that other processes find the same
+    steps = [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
+    metadata = [metadata_text(job.inventory)] if job.inventory else []
+    parts = [version("per_obspy"), *settings, *files, *steps, *metadata]
+    return bytes_hash("\n".join(map(str, parts)).encode())
+
+
+def _earlier(job: StationJob) -> FinishedStation | None:
+    """Return the station of an earlier run if all its inputs are the same and its files whole."""
+    status = _known_status(job)
+    if status is None or status.get("source") != source_facts(job.event):
+        return None
+    rejected = _stored_rejections(status)
+    return _whole_station(FinishedStation(job.station, job.shard, rejected, True), status)
+
+
+def _known_status(job: StationJob) -> Status | None:
+    """Return the status of a station if its key is the same; None if it is not or is damaged."""
+    try:
+        status = read_status(_status_file(job.shard))
+        _stored_rejections(status)
+    except StatusError:
+        return None
+    return status if status["key"] == job.key else None
+
+
+def _whole_station(station: FinishedStation, status: Status) -> FinishedStation | None:
+    """Return a resumed station with hash and spectra of its file; None if an output has changed."""
+    assert station.shard is not None  # where it would be
+    outputs = dict(status["outputs"])
+    known = outputs.pop(station.shard.name, "")
+    if changed_outputs(_status_file(station.shard), {**status, "outputs": outputs}):
+        return None
+    if not known:
+        return station._replace(shard=None)
+    # The station file is opened once: for its hash, and for its spectra if it has not changed
+    try:
+        digest, spectra = _read_shard(station.shard, known)
+    except OSError:
+        return None
+    return station._replace(hash=digest, spectra=spectra) if digest == known else None
+
+
+def _stored_rejections(status: Status) -> tuple[Rejection, ...]:
+    """Return the rejections that a status holds; raise ``StatusError`` if it is no station's."""
+    try:
+        return tuple(map(Rejection.stored, status["rejected"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise StatusError(f"{type(error).__name__}: {error}") from error
+
+
+def earlier_station(status_file: Path) -> FinishedStation:
+    """
+    Return the station of an earlier run, even if its source has changed since.
+
+    Parameters
+    ----------
+    status_file : Path
+        Next to the station file.
+
+    Raises
+    ------
+    CatalogError
+        If the status file cannot be read, or the station file has changed.
+    """
+    try:
+        status = read_status(status_file)
+        rejected = _stored_rejections(status)
+    except StatusError as error:
+        raise CatalogError(str(status_file), f"not the note of a station: {error}") from error
+    shard = status_file.with_suffix(SPECTRA)
+    station = _whole_station(FinishedStation(status_file.stem, shard, rejected, True), status)
+    if station is None:
+        raise CatalogError(str(shard), "damaged: changed since the run wrote it")
+    return station
+
+
+def _name(job: StationJob) -> str:
+    """Return the name of a station in messages."""
+    return f"station {job.station}"
+
+
+def _failed(job: StationJob, reason: str) -> FinishedStation:
+    """Return a station after a failure; the next run repeats it."""
+    rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
+    return FinishedStation(job.station, None, (rejection,), resumed=False, failed=True)

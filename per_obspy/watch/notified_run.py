@@ -1,0 +1,192 @@
+"""
+Run with configured notification of its first result, changed class counts and failures.
+
+``notification.json`` in the output folder holds the latest message and the counts that it was
+about, so that the same counts and the same failure are notified once.
+"""
+
+import json
+import logging
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from per_obspy.config import Notify, Run, load
+from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of, shortened
+from per_obspy.files import written_whole
+from per_obspy.progress import Progress, silent
+from per_obspy.results.ranked_table import table_files
+from per_obspy.runs.run import run
+from per_obspy.runs.tasks.output_folder import Result, now
+from per_obspy.watch.logs import without_secrets
+from per_obspy.watch.notification import Message, notify
+
+log = logging.getLogger(__name__)
+
+#: File of the latest message in the folder of the results.
+LATEST = "notification.json"
+
+#: Bytes of the largest file of a latest message that is read.
+LARGEST = 1 << 20
+
+
+def notified_run(
+    configuration: Path | Run,
+    output: Path | None = None,
+    progress: Progress = silent,
+    executor: Any = None,
+) -> Result:
+    """
+    Do a whole run with notification; parameters and errors are those of ``pipeline.run.run``.
+
+    A message that cannot be delivered changes neither result nor exit code.
+    """
+    settings = configuration if isinstance(configuration, Run) else load(configuration, Run)
+    if settings.notify.is_silent:
+        return run(configuration, output, executor, progress)
+    # A folder that another run holds is left alone
+    folder = Path(output or settings.output).resolve()
+    try:
+        result = run(configuration, output, executor, progress)
+    except FolderInUse:
+        raise
+    except PerError as error:
+        notify_failure(settings.notify, folder, settings.name, str(error))
+        raise
+    notify_result(settings.notify, result, settings.name)
+    return result
+
+
+def notify_result(
+    settings: Notify, result: Result, name: str, shown: Path | None = None
+) -> tuple[str, ...]:
+    """
+    Notify of the first result of a folder, or of one with changed class counts.
+
+    Parameters
+    ----------
+    settings : Notify
+        Occasions and ways.
+    result : Result
+        Of a run.
+    name : str
+        Beginning of the title.
+    shown : Path, optional
+        Folder whose page and summary people are shown, if not that of the result.
+
+    Returns
+    -------
+    reasons : tuple of str
+        One line per way that failed.
+    """
+    folder, record = result.folder, result.record
+    if record["state"] != "complete":
+        return notify_failure(settings, folder, name, "no pair or no station was usable")
+    # Counts that were notified before are no news
+    place = shown or folder
+    counts = class_counts(place)
+    earlier = _latest(folder).get("classes")
+    if earlier == counts:
+        return ()
+    # The title alone is enough for a small screen
+    words = ", ".join(f"{count} {label}" for label, count in counts.items())
+    known = earlier if isinstance(earlier, dict) else None
+    change = "first result" if known is None else f"changed from {_words(known)}"
+    title = f"{name}: {words} ({change})"
+    text = _text(place / "summary.txt") or title
+    message = Message("first" if known is None else "changed", title, text, _report(place))
+    return _sent(settings, folder, message, {"classes": counts})
+
+
+def notify_failure(settings: Notify, folder: Path, name: str, reason: str) -> tuple[str, ...]:
+    """
+    Notify of a failure, unless the latest message of the folder was about the same.
+
+    Returns
+    -------
+    reasons : tuple of str
+        One line per way that failed.
+    """
+    reason, latest = without_secrets(reason), _latest(folder)
+    if latest.get("failure") == reason:
+        return ()
+    message = Message("failure", f"{name}: failed", reason)
+    return _sent(settings, folder, message, {"classes": latest.get("classes"), "failure": reason})
+
+
+def class_counts(folder: Path) -> dict[str, int]:
+    """Return the number of pairs in each class of the risk table of a folder, worst first."""
+    import duckdb
+
+    table = table_files(folder)
+    if not table:
+        return {}
+    query = "SELECT risk_class, count(*) FROM read_parquet(?) GROUP BY 1 ORDER BY min(rank)"
+    with duckdb.connect() as database:
+        rows = database.execute(query, [[str(path) for path in table]]).fetchall()
+    return {str(label): int(count) for label, count in rows}
+
+
+def _sent(
+    settings: Notify, folder: Path, message: Message, facts: Mapping[str, object]
+) -> tuple[str, ...]:
+    """Deliver a message, and write its subject and the failed ways of delivery."""
+    reasons = notify(settings, message)
+    latest = {"kind": message.kind, "time": now(), "failed": list(reasons), **facts}
+    try:
+        with written_whole(folder / LATEST) as part:
+            part.write_text(json.dumps(latest, indent=1), encoding="utf-8")
+    except WriteError as error:
+        log.warning("%s", error)
+        return (*reasons, str(error))
+    return reasons
+
+
+def undelivered(folders: Iterable[Path]) -> str | None:
+    """
+    Return why the latest message about results in some folders was not delivered.
+
+    Returns
+    -------
+    reason : str or None
+        None if it was delivered, or there was none.
+    """
+    newest: tuple[str, int, dict[str, Any]] = ("", 0, {})
+    for folder in folders:
+        if latest := _latest(folder):
+            # Messages of one second are in the order of their files
+            written = (folder / LATEST).stat().st_mtime_ns
+            newest = max(
+                newest, (str(latest.get("time")), written, latest), key=lambda one: one[:2]
+            )
+    failed = newest[2].get("failed")
+    return shortened(str(failed[0]), 300) if isinstance(failed, list) and failed else None
+
+
+def _latest(folder: Path) -> dict[str, Any]:
+    """Return the latest message of a folder, empty without one."""
+    try:
+        with (folder / LATEST).open(encoding="utf-8") as file:
+            found = json.loads(file.read(LARGEST))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _words(counts: Mapping[str, object]) -> str:
+    """Return class counts as words."""
+    return ", ".join(f"{count} {label}" for label, count in counts.items()) or "none"
+
+
+def _text(file: Path) -> str:
+    """Return the text of a summary; empty where it cannot be read."""
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        return f"{file.name}: {reason_of(error)}"
+
+
+def _report(folder: Path) -> Path:
+    """Return the page of a result, else its summary."""
+    page = folder / "report.html"
+    return page if page.is_file() else folder / "summary.txt"
