@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from per_obspy import cli, threads
+from per_obspy import threads
+from per_obspy.cli import application
 
 # The first example of a test may compile a kernel, which takes seconds. In CI every run tries the
 # same examples, so that a change is judged by itself; elsewhere each run tries new ones.
@@ -48,7 +49,7 @@ def call(monkeypatch, capsys):
     def called(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])
         with pytest.raises(SystemExit) as stop:
-            cli.main()
+            application.main()
         out, err = capsys.readouterr()
         assert "Traceback" not in err
         code = stop.value.code

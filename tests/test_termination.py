@@ -29,9 +29,9 @@ TABLES = ("risk.parquet", "risk.csv", "rejected.csv", "totals.csv", "buildings.p
 #: The command line; figures are short files, as most of the time of a small run goes into them.
 WITHOUT_FIGURES = """
 from small_run import plain_figures
-from per_obspy import cli
+from per_obspy.cli import application
 with plain_figures():
-    cli.main()
+    application.main()
 """
 
 #: Main thread in compiled code, which no exception of Python interrupts.

@@ -241,7 +241,6 @@ def check_pairs(
 
     Example: per-obspy pairs check pairs.xlsx --write
     """
-    from per_obspy.cli.pairs import asked_columns, asked_units, is_terminal
     from per_obspy.inventory.files.reading import checked_file, read_pairs
     from per_obspy.inventory.files.side_file import form_as_toml, form_of, write_form
 

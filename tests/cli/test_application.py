@@ -232,12 +232,12 @@ def test_an_empty_output_is_refused(call, tmp_path, monkeypatch, command):
 INTERRUPTED = """
 import sys
 import time
-from per_obspy import cli
+from per_obspy.cli import application
 from per_obspy.runs.tasks.parallel import Workers, Work, results
 notes = f"open({sys.argv[2]!r} + str(__import__('os').getpid()), 'w').close()"
 task = f"{notes} or __import__('time').sleep(100)"
 
-@cli.app.command()
+@application.app.command()
 def sleep(folder: str) -> None:
     list(results([task, task], eval_work(), Workers(2)))
 
@@ -245,7 +245,7 @@ def eval_work():
     return Work(eval, lambda *_: None)
 
 if __name__ == "__main__":
-    cli.main()
+    application.main()
 """
 
 

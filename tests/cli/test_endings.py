@@ -1,7 +1,7 @@
 """
 Commands with ``--dask``: by an address, a scheduler file, and a cluster of this machine.
 
-``watch`` is in tests/cli/operation/test_watch_command.py.
+``watch`` is in tests/cli/watch/test_watch_command.py.
 """
 
 import re

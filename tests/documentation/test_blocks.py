@@ -13,7 +13,7 @@ import pytest
 from blocks import PYTHON, SHELLS, Block, blocks, commands, pages
 from pydantic import ValidationError
 
-from per_obspy import cli
+from per_obspy.cli import application
 from per_obspy.config import Design, Ensemble, Run, Simulation
 from per_obspy.config.pairs import TableForm
 
@@ -76,7 +76,7 @@ def _run_command(command: str, block: Block) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", words)
         with pytest.raises(SystemExit) as end:
-            cli.main()
+            application.main()
     assert not end.value.code, f"{block.page}: {text} ends with {end.value.code}"
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy import cli
+from per_obspy.cli import application
 
 from .small_run import SPECTRA
 
@@ -62,7 +62,7 @@ def _call(folder, *arguments):
             sys, "argv", ["per-obspy", "screen", str(folder / "ensemble.toml"), *arguments]
         )
         with pytest.raises(SystemExit) as stop:
-            cli.main()
+            application.main()
     return stop.value.code or 0
 
 

@@ -17,7 +17,8 @@ import pytest
 from messy_tables import NAMES, ROWS, Messy, plain, readable, refused, suspected, text_of
 from pandas.testing import assert_frame_equal
 
-from per_obspy import cli, read_pairs
+from per_obspy import read_pairs
+from per_obspy.cli import application
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.suspicions import ROW_SUSPICIONS
@@ -54,7 +55,7 @@ def called(*arguments: str) -> Said:
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(sys, "argv", ["per-obspy", *arguments])
         with pytest.raises(SystemExit) as stop:
-            cli.main()
+            application.main()
     code = stop.value.code
     return Said(code if isinstance(code, int) else 0, out.getvalue(), err.getvalue())
 

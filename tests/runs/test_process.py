@@ -274,6 +274,6 @@ def test_wrong_input_is_one_line(source, tmp_path, fault):
         "no such event": (source, "-o", tmp_path / "out", "--event", tmp_path / "absent.xml"),
     }
     done = call(*arguments[fault])
-    # which ``cli.main`` turns into a line and exit code 2
+    # which ``application.main`` turns into a line and exit code 2
     assert isinstance(done.exception, CatalogError)
     assert WRONG[fault] in str(done.exception)
