@@ -192,6 +192,7 @@ def _record_files() -> dict[str, Entry]:
         | by_detection
         | {
             "mseed": Entry("record.mseed", partial(_written, "MSEED"), _raw_record),
+            "mseed3": Entry("record.mseed3", partial(_written, "MSEED3"), _raw_record),
             "sac": Entry("record.sac", partial(_written, "SAC"), _raw_record),
             "knet": Entry("record.knet", (bundled / KNET).read_bytes, _records),
             "asdf": Entry("workspace.h5", _workspace, _asdf),
