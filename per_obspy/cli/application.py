@@ -17,6 +17,7 @@ import typer
 import per_obspy
 from per_obspy.cli.info import info
 from per_obspy.cli.init import init, warm_up
+from per_obspy.cli.observed import observed
 from per_obspy.cli.pairs import catalog, pairs
 from per_obspy.cli.printing import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.cli.records import events, fetch
@@ -57,7 +58,7 @@ app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
     *(run, init, warm_up, simulate, process, spectra, screen),
-    *(report, show, events, fetch, info, watch, status),
+    *(report, show, observed, events, fetch, info, watch, status),
 )
 for command in COMMANDS:
     app.command()(command)

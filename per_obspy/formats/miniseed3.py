@@ -111,6 +111,7 @@ def _records(content: bytes, name: str) -> Iterator[_Record]:
             if record.formatversion != 3:
                 reason = f"record {number} is miniSEED {record.formatversion}, the first one is 3"
                 raise RecordRejected(name, reason)
+            # Texts stand beside the motion, as the log of an instrument
             if not record.numsamples or record.sampletype == _TEXT:
                 continue
             if not 0 < record.samprate < np.inf:
@@ -143,6 +144,7 @@ def _trace(run: list[_Record], name: str, headonly: bool) -> Trace:
         reason = f"source identifier {first.kind.identifier!r} is not one of the FDSN"
         raise RecordRejected(name, reason) from error
     sizes = [record.samples.size for record in run]
+    # What ObsPy has no place for is kept as it is
     header = {
         "network": network,
         "station": station,
@@ -158,6 +160,7 @@ def _trace(run: list[_Record], name: str, headonly: bool) -> Trace:
             "extra_headers": _extra_headers(run, sizes, name),
         },
     }
+    # ObsPy shows heads by their number of samples
     if headonly:
         return Trace(header=header | {"npts": sum(sizes)})
     return Trace(np.concatenate([record.samples for record in run]), header)
@@ -174,6 +177,7 @@ def _extra_headers(
         if record.extra == last:
             continue
         last = record.extra
+        # The library does not look into them
         try:
             changes.append((int(start), json.loads(last) if last else {}))
         except ValueError as error:
@@ -221,35 +225,48 @@ def _packed(
     library: ModuleType, trace: Trace, encoding: str | None, record_length: int
 ) -> Iterator[bytes]:
     """Yield the records of a trace; extra headers begin a record where they change."""
+    letter, name = _encoding(trace, encoding)
     stats = trace.stats
+    # Runs of equal extra headers; the first begins with the trace
+    changes = list(stats.get("mseed3", {}).get("extra_headers", []))
+    if not changes or changes[0][0]:
+        changes.insert(0, (0, {}))
+    ends = [start for start, _ in changes[1:]] + [stats.npts]
+    record = _template(library, stats, library.DataEncoding[name], record_length)
+    # A time of its own for each run
+    for (start, extra), end in zip(changes, ends, strict=True):
+        record.starttime = stats.starttime.ns + round(start * 1e9 / stats.sampling_rate)
+        record.extra = json.dumps(extra) if extra else ""
+        yield from record.generate(np.ascontiguousarray(trace.data[start:end]), letter)
+
+
+def _template(library: ModuleType, stats: Any, encoding: int, record_length: int) -> Any:
+    """Return a record of the library with what all records of a trace have."""
+    record = library.MS3Record(reclen=record_length, encoding=encoding)
+    record.formatversion = 3
+    codes = (stats.network, stats.station, stats.location, stats.channel)
+    record.sourceid = library.nslc2sourceid(*codes)
+    record.samprate = stats.sampling_rate
+    # What the reader keeps, or the usual
+    kept = stats.get("mseed3", {})
+    record.pubversion, record.flags = kept.get("publication_version", 1), kept.get("flags", 0)
+    return record
+
+
+def _encoding(trace: Trace, asked: str | None) -> tuple[str, str]:
+    """Return the library's letter for the samples, and the name of the encoding."""
+    # Other types would lose digits
     letter = _LETTERS.get(trace.data.dtype.name, "")
     if not letter or np.ma.isMaskedArray(trace.data):
         raise ValueError(
             f"{trace.id}: samples must be int32, float32 or float64 without a mask, "
             f"got {trace.data.dtype.name}"
         )
-    name = encoding or _ENCODINGS[letter][0]
+    name = asked or _ENCODINGS[letter][0]
     if name not in _ENCODINGS[letter]:
         expected = ", ".join(_ENCODINGS[letter])
         raise ValueError(f"{trace.id}: encoding must be one of {expected}, got {name!r}")
-    kept = stats.get("mseed3", {})
-    changes = list(kept.get("extra_headers", []))
-    if not changes or changes[0][0]:
-        changes.insert(0, (0, {}))
-    ends = [start for start, _ in changes[1:]] + [stats.npts]
-    for (start, extra), end in zip(changes, ends, strict=True):
-        record = library.MS3Record(reclen=record_length, encoding=library.DataEncoding[name])
-        record.formatversion = 3
-        record.sourceid = library.nslc2sourceid(
-            stats.network, stats.station, stats.location, stats.channel
-        )
-        record.starttime = stats.starttime.ns + round(start * 1e9 / stats.sampling_rate)
-        record.samprate = stats.sampling_rate
-        record.pubversion = kept.get("publication_version", 1)
-        record.flags = kept.get("flags", 0)
-        if extra:
-            record.extra = json.dumps(extra)
-        yield from record.generate(np.ascontiguousarray(trace.data[start:end]), letter)
+    return letter, name
 
 
 def _pymseed(name: str) -> ModuleType:

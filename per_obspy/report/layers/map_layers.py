@@ -23,11 +23,13 @@ from per_obspy.report.layers.geopackage import (
     points,
     write_styles,
 )
+from per_obspy.report.layers.inspections import INSPECTIONS, MOST, inspection_layer
 from per_obspy.report.layers.kml import has_both_places
 from per_obspy.report.layers.qgis import (
     ProjectLayer,
     class_style,
     column_aliases,
+    form_style,
     single_style,
     write_project,
 )
@@ -139,7 +141,7 @@ def _multiple(shapes: Shapes) -> Shapes:
 PAIRS, STATIONS, AREAS = "pairs", "stations", "areas"
 
 #: Layers from the top of the map to its bottom.
-DRAWN = (STATIONS, PAIRS, "buildings_without_outline", "buildings", AREAS)
+DRAWN = (INSPECTIONS, STATIONS, PAIRS, "buildings_without_outline", "buildings", AREAS)
 
 #: Columns of stations on a map.
 _OF_STATIONS = ("station", "state", "pairs", "pga", "pgv", "warnings", "rejected")
@@ -203,6 +205,8 @@ def write_layers(
                 shapes = pair_shapes(table)
                 rows.append(table, shapes)
                 book.add(Layer(PAIRS, table, shapes))
+        # Forms for the field, then what is drawn below the pairs
+        book.add(inspection_layer(pd.concat(book.worst)))
         for layer in _other_layers(sources, table_part, book.has_places):
             book.add(layer)
         write_styles(part, {layer.name: layer.style for layer in book.described()})
@@ -217,6 +221,7 @@ class _Package:
         self.path, self.sources = path, sources
         self.layers: dict[str, ProjectLayer] = {}
         self.boxes: list[FloatArray] = []
+        self.worst: list[pd.DataFrame] = []
         self.has_places = False
 
     def add(self, layer: Layer) -> None:
@@ -230,6 +235,9 @@ class _Package:
         append_layer(self.path, layer, is_new, self.sources.facts)
         if layer.name == PAIRS:
             self.has_places = has_both_places(layer.table.columns)
+            left = MOST - sum(map(len, self.worst))
+            if not self.worst or left:
+                self.worst.append(layer.table[["pair_id", "rank", "longitude", "latitude"]][:left])
             if shapely.is_geometry(layer.shapes).any():
                 self.boxes.append(shapely.total_bounds(layer.shapes))
 
@@ -248,6 +256,8 @@ class _Package:
 
 def _style(layer: Layer, kind: str, classes: Sequence[str]) -> str:
     """Return the style of a layer: by severity, or one open symbol."""
+    if layer.name == INSPECTIONS:
+        return form_style()
     columns = [str(name) for name in layer.table]
     known = {name: column.unit for name in columns if (column := known_column(name))}
     aliases = column_aliases(columns, known | _UNITS)

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
+from per_obspy.report.layers.inspections import QUESTIONS, add_form
 from per_obspy.report.style import class_colours
 
 #: First line of the XML files of QGIS.
@@ -98,6 +99,13 @@ def single_style(
     outline = "line_color" if kind == "line" else "outline_color"
     _add_symbol(symbols, "0", geometry, options | {outline: _rgba(colour)})
     return _document(root, geometry, aliases)
+
+
+def form_style() -> str:
+    """Return the style of the inspections: a square beside its pair, and how fields are asked."""
+    root = ElementTree.fromstring(single_style("Point", "#0057b8", QUESTIONS).removeprefix(DOCTYPE))
+    add_form(root)
+    return DOCTYPE + ElementTree.tostring(root, encoding="unicode")
 
 
 def _root() -> ElementTree.Element:

@@ -69,10 +69,10 @@ def find_pair(name: str, folder: Path) -> ShownPair:
     if rows.empty:
         reason = f"no pair {shortened(name, 80)!r}: name a pair_id of the table, or a rank as #1"
         raise CatalogError(str(table[0]), reason)
-    return ShownPair(rows.iloc[0], folder, _simulated(folder))
+    return ShownPair(rows.iloc[0], folder, is_simulated(folder))
 
 
-def _simulated(folder: Path) -> bool:
+def is_simulated(folder: Path) -> bool:
     """Return whether the motion of the results is simulated, by the file that describes them."""
     for name in ("run.json", "ensemble.json"):
         try:

@@ -184,7 +184,7 @@ def test_qgis_finds_the_style_of_every_layer(written):
         "WHERE s.useAsDefault = 1"
     )
     styles = dict(_rows(path, query))
-    assert set(styles) == {"pairs", "buildings", "stations", "areas"}
+    assert set(styles) == {"inspections", "pairs", "buildings", "stations", "areas"}
     aliases = ElementTree.fromstring(styles["pairs"]).iter("alias")
     named = {alias.get("field"): alias.get("name") for alias in aliases}
     assert named["expected_impact_velocity"] == "expected impact velocity (m/s)"
@@ -203,7 +203,8 @@ def test_the_project_opens_every_layer_beside_it(written, tmp_path):
     # the tree names the layers from top to bottom; each is described, and GDAL can open it
     tree = [layer.get("id") for layer in root.iter("layer-tree-layer")]
     described = {layer.findtext("id"): layer for layer in root.iter("maplayer")}
-    assert tree == [f"per_obspy_{name}" for name in ("stations", "pairs", "buildings", "areas")]
+    names = ("inspections", "stations", "pairs", "buildings", "areas")
+    assert tree == [f"per_obspy_{name}" for name in names]
     assert tree == list(described)
     for layer in described.values():
         source, _, name = layer.findtext("datasource").partition("|layername=")
@@ -230,7 +231,7 @@ def test_pairs_of_which_only_the_middle_is_known_are_points(written):
     path = written([only], stations=STATIONS[:0])
     meta, points, _ = _read(path, "pairs")
     assert (meta["geometry_type"], points[0].x) == ("Point", -99.1)
-    assert [name for name, _ in pyogrio.list_layers(path)] == ["pairs", "layer_styles"]
+    assert [name for name, _ in pyogrio.list_layers(path)] == ["pairs", "inspections", "layer_styles"]
 
 
 def test_a_layer_that_cannot_be_finished_leaves_the_old_files(written, tmp_path):
