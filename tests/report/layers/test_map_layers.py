@@ -231,7 +231,8 @@ def test_pairs_of_which_only_the_middle_is_known_are_points(written):
     path = written([only], stations=STATIONS[:0])
     meta, points, _ = _read(path, "pairs")
     assert (meta["geometry_type"], points[0].x) == ("Point", -99.1)
-    assert [name for name, _ in pyogrio.list_layers(path)] == ["pairs", "inspections", "layer_styles"]
+    layers = [name for name, _ in pyogrio.list_layers(path)]
+    assert layers == ["pairs", "inspections", "layer_styles"]
 
 
 def test_a_layer_that_cannot_be_finished_leaves_the_old_files(written, tmp_path):
