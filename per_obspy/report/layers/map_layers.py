@@ -141,7 +141,7 @@ def _multiple(shapes: Shapes) -> Shapes:
 PAIRS, STATIONS, AREAS = "pairs", "stations", "areas"
 
 #: Layers from the top of the map to its bottom.
-DRAWN = (INSPECTIONS, STATIONS, PAIRS, "buildings_without_outline", "buildings", AREAS)
+DRAWN = (STATIONS, PAIRS, INSPECTIONS, "buildings_without_outline", "buildings", AREAS)
 
 #: Columns of stations on a map.
 _OF_STATIONS = ("station", "state", "pairs", "pga", "pgv", "warnings", "rejected")

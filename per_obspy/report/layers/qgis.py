@@ -72,7 +72,10 @@ def class_style(
 
 
 def single_style(
-    geometry: str, colour: str, aliases: Mapping[str, str] = MappingProxyType({})
+    geometry: str,
+    colour: str,
+    aliases: Mapping[str, str] = MappingProxyType({}),
+    marker: str = "triangle",
 ) -> str:
     """
     Return a style with one open symbol for all features, as of stations and areas.
@@ -85,6 +88,8 @@ def single_style(
         Colour of the outline, hexadecimal.
     aliases : mapping of str to str
         Column -> name with unit.
+    marker : str
+        Shape of points, as QGIS names it.
     """
     root = _root()
     renderer = ElementTree.SubElement(root, "renderer-v2", type="singleSymbol", symbollevels="0")
@@ -92,7 +97,7 @@ def single_style(
     # Open symbols cover no pair
     kind = _KINDS[geometry][1]
     options = {
-        "marker": {"name": "triangle", "size": "2.8", "color": "255,255,255,0"},
+        "marker": {"name": marker, "size": "2.8", "color": "255,255,255,0"},
         "line": {"line_width": "0.4"},
         "fill": {"style": "no", "outline_width": "0.4"},
     }[kind]
@@ -103,7 +108,9 @@ def single_style(
 
 def form_style() -> str:
     """Return the style of the inspections: a square beside its pair, and how fields are asked."""
-    root = ElementTree.fromstring(single_style("Point", "#0057b8", QUESTIONS).removeprefix(DOCTYPE))
+    root = ElementTree.fromstring(
+        single_style("Point", "#0057b8", QUESTIONS, "square").removeprefix(DOCTYPE)
+    )
     add_form(root)
     return DOCTYPE + ElementTree.tostring(root, encoding="unicode")
 

@@ -203,7 +203,7 @@ def test_the_project_opens_every_layer_beside_it(written, tmp_path):
     # the tree names the layers from top to bottom; each is described, and GDAL can open it
     tree = [layer.get("id") for layer in root.iter("layer-tree-layer")]
     described = {layer.findtext("id"): layer for layer in root.iter("maplayer")}
-    names = ("inspections", "stations", "pairs", "buildings", "areas")
+    names = ("stations", "pairs", "inspections", "buildings", "areas")
     assert tree == [f"per_obspy_{name}" for name in names]
     assert tree == list(described)
     for layer in described.values():
