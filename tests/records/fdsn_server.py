@@ -6,6 +6,7 @@ It answers from memory and fails on demand.
 
 import copy
 import itertools
+import json
 import sys
 import threading
 import time
@@ -60,6 +61,8 @@ class FdsnServer(ThreadingHTTPServer):
         self.times: list[float] = []
         self.faults: list[tuple[str, str, Fault]] = []
         self.extra: dict[str, bytes] = {}
+        # ShakeMaps of every event, as the service of the USGS lists them
+        self.maps: list[dict[str, object]] = []
         self.lock = threading.Lock()
 
     @property
@@ -75,6 +78,16 @@ class FdsnServer(ThreadingHTTPServer):
         text = StringIO()
         self.inventory.write(text, format="STATIONTXT", level="channel")
         return text.getvalue().encode()
+
+    def add_map(self, version: str, **files: bytes) -> None:
+        """Add a version of the ShakeMap; names of files have ``_`` for their dot."""
+        contents = {}
+        for name, body in files.items():
+            path = f"/archive/product/shakemap/xx1/{len(self.maps)}/{name.replace('_', '.')}"
+            self.extra[path] = body
+            contents[f"download/{name.replace('_', '.')}"] = {"url": f"{self.url}{path}"}
+        product = {"status": "UPDATE", "preferredWeight": 100, "updateTime": len(self.maps)}
+        self.maps.append(product | {"properties": {"version": version}, "contents": contents})
 
     def asked(self, service: str, subject: str | None = None) -> int:
         """Return the number of requests to a service."""
@@ -172,9 +185,16 @@ class _Handler(BaseHTTPRequestHandler):
             return event_text(dict(list(listed.items())[:limit])).encode()
         if parameters["eventid"] not in events:
             return b""
+        if parameters.get("format") == "geojson":
+            return self._products("includesuperseded" in parameters)
         content = BytesIO()
         Catalog([events[parameters["eventid"]]]).write(content, format="QUAKEML")
         return content.getvalue()
+
+    def _products(self, with_superseded: bool) -> bytes:
+        maps = self.server.maps if with_superseded else self.server.maps[-1:]
+        products = {"shakemap": maps} if maps else {"origin": [{"status": "UPDATE"}]}
+        return json.dumps({"type": "Feature", "properties": {"products": products}}).encode()
 
     def reply(
         self,

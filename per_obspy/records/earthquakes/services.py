@@ -169,7 +169,7 @@ def find_events(source: str, query: Mapping[str, str]) -> list[Earthquake]:
     # Everything else is the base URL or the name of an event service, which selects itself
     else:
         times = {name: query[name] for name in query.keys() & {"starttime", "endtime"}}
-        select, url = _selection(public_url(source), times), _event_url(source)
+        select, url = _selection(public_url(source), times), event_url(source)
         rows = _answered(url, _text_rows, {**query, "format": "text"})
         # A service may pass over a parameter that it does not know
         if others := sum(not select(row) for row in rows):
@@ -212,7 +212,7 @@ def listed_events(pool: WebPool, provider: str, query: Mapping[str, str]) -> Lis
         If the service does not answer, or its answer is no list.
     """
     # "Not found" is the answer of some services to an empty list
-    url = _event_url(provider)
+    url = event_url(provider)
     try:
         rows, problems = _text_rows(answer(pool, url, {**query, "format": "text"}))
     except NotFound:
@@ -223,7 +223,7 @@ def listed_events(pool: WebPool, provider: str, query: Mapping[str, str]) -> Lis
     return rows, [f"{public_url(url)}: {problem}" for problem in problems]
 
 
-def _event_url(provider: str) -> str:
+def event_url(provider: str) -> str:
     """Return the address of an event service."""
     return f"{base_url(provider)}/fdsnws/event/1/query"
 
@@ -295,7 +295,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
     # Anything but a whole file is fetched
-    shown = public_url(_event_url(provider))
+    shown = public_url(event_url(provider))
     content = event_content(pool, provider, event_id)
     if not content:
         raise CatalogError(shown, f"has no event {event_id}")
@@ -323,7 +323,7 @@ def event_content(pool: WebPool, provider: str, event_id: str) -> bytes:
         If the service does not answer.
     """
     try:
-        return answer(pool, _event_url(provider), {"eventid": event_id, "format": "xml"})
+        return answer(pool, event_url(provider), {"eventid": event_id, "format": "xml"})
     except NotFound:
         return b""
 
