@@ -67,6 +67,7 @@ def fetch_shakemap(
     if chosen is None:
         return None
     number = _version(chosen)
+    # Versions stand beside each other
     place = folder / f"shakemap-{number}"
     place.mkdir(parents=True, exist_ok=True)
     files = {
@@ -76,7 +77,7 @@ def fetch_shakemap(
     }
     if GRID not in files:
         raise ServiceError(f"{public_url(url)}: version {number} of the ShakeMap has no {GRID}")
-    # What is kept can be read
+    # What is kept can be read; a damaged grid is asked for again
     try:
         read_shakemap(files[GRID], files.get(UNCERTAINTY))
     except CatalogError as error:
