@@ -1,7 +1,6 @@
 """Second stage: pairs and the stations become the risk table, chunk by chunk."""
 
 import math
-import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
@@ -26,7 +25,6 @@ from per_obspy.runs.stations import simulated_motion
 from per_obspy.runs.tasks.chunk import CHUNK, ChunkJob, do_chunks
 from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
-from per_obspy.runs.tasks.risk_cells import WORK, write_cells, write_texts
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.ranking import EVERY_STATE
 
@@ -144,14 +142,10 @@ def _ranked(context: RunContext, parts: Sequence[Part], facts: dict[str, str]) -
     settings, folder = context.settings, context.folder
     tables = [part.path for part in parts if part.path]
     pairs = sum(pq.read_metadata(table.absolute()).num_rows for table in tables)
-    if pairs >= settings.dataset_from:
-        risk = write_cells(parts, folder, facts, settings.dataset_cell, context.workers)
-        texts = write_texts(risk.files, folder, settings.csv_rows)
-        return risk._replace(files=[*risk.files, *texts])
+    # One file, or one per cell of very many pairs
+    cell = settings.dataset_cell if pairs >= settings.dataset_from else None
     context.progress("ranking", 0, 1)
-    risk = write_risk(tables, folder, facts, settings.csv_rows)
-    # Cells that a killed run has begun are of no use
-    shutil.rmtree(folder / WORK, ignore_errors=True)
+    risk = write_risk(tables, folder, facts, settings.csv_rows, cell)
     context.progress("ranking", 1, 1)
     return risk
 
