@@ -65,6 +65,7 @@ def cells_of_parts(parts: Sequence[Path], size: float) -> list[list[str]]:
     """Return the names of the cells of all parts, sorted, in groups of files open together."""
     names = set[str]()
     for part in parts:
+        # A table without coordinates has one cell
         known = pq.read_schema(part.absolute()).names
         columns = [name for name in ("longitude", "latitude") if name in known]
         names |= {*_cells_of(pq.read_table(part.absolute(), columns=columns), size)}

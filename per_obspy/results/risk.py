@@ -133,6 +133,7 @@ def _write_rows(
             count_values(piece["station"], stations)
             if not before:
                 text.write_text(header(piece.column_names), encoding="utf-8")
+            # Rows whose rank is at most the number of rows of the text
             if before < csv_rows:
                 _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
             before += piece.num_rows
