@@ -13,7 +13,7 @@ from per_obspy.cli.printing import AsJson, named_path, print_table, stop_if_noth
 from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
-    from per_obspy.runs.inputs.facts import Facts
+    from per_obspy.runs.inputs.description import Description
 
 #: Columns and lines of the screen that everything fits on.
 WIDTH, HEIGHT = 100, 24
@@ -63,10 +63,10 @@ def info(
 
     Example: per-obspy info records
     """
-    from per_obspy.runs.inputs.described_inputs import described
+    from per_obspy.runs.inputs.description import describe
 
     named_path(path)  # an empty name would be the folder of the shell
-    found = described(path, stationxml)
+    found = describe(path, stationxml)
     if as_json:
         print(json.dumps({"kind": found.kind, **found.values}))
     else:
@@ -81,7 +81,7 @@ def info(
     stop_if_nothing(int(found.usable))
 
 
-def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
+def screen_of(path: str, found: "Description", taken: int = 0) -> list[str]:
     """
     Return the description of an input as lines that fit on one screen.
 
@@ -89,7 +89,7 @@ def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
     ----------
     path : str
         As it was named.
-    found : Facts
+    found : Description
         The description.
     taken : int
         Lines of the screen that are needed for other text.
@@ -107,7 +107,7 @@ def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
     return [shortened(head, WIDTH), *facts, *drawn]
 
 
-def _with_place(found: "Facts", is_drawn: bool) -> list[tuple[str, str]]:
+def _with_place(found: "Description", is_drawn: bool) -> list[tuple[str, str]]:
     """Return the facts of an input; a single place is a fact instead of a map."""
     places = [place for layer in found.places.values() for place in zip(*layer, strict=True)]
     if is_drawn or not places:
@@ -116,7 +116,7 @@ def _with_place(found: "Facts", is_drawn: bool) -> list[tuple[str, str]]:
     return [*found.lines, ("place", f"latitude {latitude:g}, longitude {longitude:g}, degrees")]
 
 
-def _wrapped(found: "Facts", label: str, text: str) -> list[str]:
+def _wrapped(found: "Description", label: str, text: str) -> list[str]:
     """Return a fact as wrapped lines, the last one shortened."""
     width = min(max(len(known) for known, _ in [*found.lines, ("place", "")]), LONGEST_LABEL)
     lines = textwrap.wrap(printable(text), WIDTH - width - 4, break_on_hyphens=False) or [""]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.progress import Progress
-    from per_obspy.runs.tasks.output_folder import Result
+    from per_obspy.runs.output_folder import Result
 
 
 def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[object]]") -> None:

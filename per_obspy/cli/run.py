@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from per_obspy.errors import Rejection
-    from per_obspy.runs.tasks.output_folder import Result
+    from per_obspy.runs.output_folder import Result
 
 #: Columns of the worst pairs that are printed, with their titles.
 SHOWN = {

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from per_obspy.config import Design, Run
     from per_obspy.results.coverage import Coverage
-    from per_obspy.runs.tasks.output_folder import Result
+    from per_obspy.runs.output_folder import Result
 
 #: Columns of the worst pairs that are printed: by a design spectrum, and of an ensemble where the
 #: table has them.

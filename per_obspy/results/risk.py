@@ -4,8 +4,8 @@ import json
 import shutil
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,13 +15,13 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from per_obspy.files import written_whole
+from per_obspy.files import temporary_folder, writing, written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.inventory.suspicions import ODD
-from per_obspy.results.parts import bounded_database, joined_rows, joined_schema, text_columns
-from per_obspy.results.ranked_cells import count_values
-from per_obspy.results.ranked_table import ROWS, RankedTable, ranked_table
+from per_obspy.results.parts import bounded_database, joined_rows, joined_schema
+from per_obspy.results.ranked_cells import CellFiles, cell_files, cells_of_parts, ranked_writer
+from per_obspy.results.ranked_table import ROWS, RankedTable, ranked_table, table_files
 from per_obspy.results.table_files import (
     rounded_arrow,
     rounded_table,
@@ -57,10 +57,14 @@ class RiskFiles(NamedTuple):
 
 
 def write_risk(
-    parts: Sequence[Path], folder: Path, facts: Mapping[str, str], csv_rows: int
+    parts: Sequence[Path],
+    folder: Path,
+    facts: Mapping[str, str],
+    csv_rows: int,
+    cell: float | None = None,
 ) -> RiskFiles:
     """
-    Write ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``, in one pass over the parts.
+    Write ``risk.parquet`` or ``risk/``, ``risk.csv`` and ``risk.columns.csv``.
 
     Parameters
     ----------
@@ -73,16 +77,42 @@ def write_risk(
         simulated.
     csv_rows : int
         Number of rows of ``risk.csv``, the worst ones.
+    cell : float, optional
+        Width and height of the cells in ``risk/``, degrees; one file of all rows if not given.
     """
-    names = ("risk.parquet", "risk.csv", "risk.columns.csv")
-    table, text, columns = files = [folder / name for name in names]
+    text, columns = folder / "risk.csv", folder / "risk.columns.csv"
     # Schema of the parts, and of the table
     schema = joined_schema(parts)
     whole = ranked_schema(schema, facts)
-    with written_whole(table) as part, written_whole(text) as lines:
-        states, stations = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
+    with written_whole(text) as lines, _opened(parts, folder, whole, cell) as (first, *others):
+        rows = _ranked_rows(parts, schema, whole)
+        with first as table:
+            states, stations = _write_rows(rows, table, lines, csv_rows)
+        # More cells than files that can be open together
+        for files in others:
+            with files as table:
+                for piece in _ranked_rows(parts, schema, whole):
+                    table.write_table(piece)
     write_columns(whole.names, columns)
-    return RiskFiles(files, states, stations)
+    return RiskFiles([*table_files(folder), text, columns], states, stations)
+
+
+@contextmanager
+def _opened(
+    parts: Sequence[Path], folder: Path, schema: pa.Schema, cell: float | None
+) -> Iterator[list[AbstractContextManager[pq.ParquetWriter | CellFiles]]]:
+    """Yield the file of the table, or those of its cells, to be opened one after the other."""
+    if cell is None:
+        with written_whole(folder / "risk.parquet") as part:
+            yield [ranked_writer(part, schema)]
+        return
+    # The folder of the cells appears when all of them are finished
+    with temporary_folder(folder) as room:
+        (room / "risk").mkdir()
+        groups = cells_of_parts(parts, cell)
+        yield [cell_files(room / "risk", schema, group, cell) for group in groups]
+        with writing(folder / "risk"):
+            (room / "risk").rename(folder / "risk")
 
 
 def ranked_schema(schema: pa.Schema, facts: Mapping[str, str]) -> pa.Schema:
@@ -92,25 +122,28 @@ def ranked_schema(schema: pa.Schema, facts: Mapping[str, str]) -> pa.Schema:
 
 
 def _write_rows(
-    rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int
+    rows: Iterator[pa.Table], table: pq.ParquetWriter | CellFiles, text: Path, csv_rows: int
 ) -> tuple[Counter[str], Counter[str]]:
     """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
-    states, stations, first = Counter[str](), Counter[str](), next(rows)
-    dictionaries = text_columns(first.schema)
-    text.write_text(header(first.column_names), encoding="utf-8")
-    with (
-        bounded_database(table.parent) as database,
-        pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
-    ):
-        for piece in chain([first], rows):
-            writer.write_table(piece)
+    states, stations, before = Counter[str](), Counter[str](), 0
+    with bounded_database(text.parent) as database:
+        for piece in rows:
+            table.write_table(piece)
             count_values(piece["state"], states)
             count_values(piece["station"], stations)
+            if not before:
+                text.write_text(header(piece.column_names), encoding="utf-8")
             # Rows whose rank is at most the number of rows of the text
-            before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
                 _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
+            before += piece.num_rows
     return states, stations
+
+
+def count_values(column: pa.ChunkedArray, counter: Counter[str]) -> None:
+    """Add the number of each value of a column to a counter."""
+    for value, number in zip(*column.value_counts().flatten(), strict=True):
+        counter[value.as_py()] += number.as_py()
 
 
 def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:

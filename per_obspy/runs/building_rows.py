@@ -14,9 +14,9 @@ from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.ranked_table import ranked_table, table_files
 from per_obspy.runs.provenance import RunContext
-from per_obspy.runs.tasks.building_rows import RowsJob, do_row_chunks
+from per_obspy.runs.tasks.building_rows import RowsTask
 from per_obspy.runs.tasks.ground_files import GroundFiles
-from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.parallel import Workers, finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 
 
@@ -71,8 +71,8 @@ def building_rows(
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
         found = find_rows(pairs, settings.rows, settings.totals.area, room)
-        jobs = _jobs(settings, folder, ground, found)
-        parts = _parts(jobs, context.workers, found.contacts)
+        tasks = _tasks(settings, folder, ground, found)
+        parts = _parts(tasks, context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
         outputs = write_rows([part.path for part in parts if part.path], folder, facts)
@@ -93,21 +93,22 @@ def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, in
     }
 
 
-def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsJob]:
-    """Yield one job per chunk of rows."""
+def _tasks(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
+    """Yield one task per chunk of rows."""
     exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
     for number, table in enumerate(chunks_of(found.file)):
         # Pairs that a map serves have no record
         station = stations.get(table["station"][0].as_py()) if exact else None
-        yield RowsJob(number, table, station, folder / "rows" / f"{number:06}.parquet")
+        part = folder / "rows" / f"{number:06}.parquet"
+        yield RowsTask(number=number, part=part, contacts=table, station=station)
 
 
-def _parts(jobs: Iterable[RowsJob], workers: Workers, contacts: int) -> list[Part]:
+def _parts(tasks: Iterable[RowsTask], workers: Workers, contacts: int) -> list[Part]:
     """Compute the chunks of a number of contacts, and return the parts in order."""
     workers.progress("rows", 0, contacts)
     parts, done = list[Part](), 0
-    for part in do_row_chunks(jobs, workers):
+    for part in finish(tasks, workers):
         parts.append(part)
         done += part.rows
         workers.progress("rows", done, contacts)

@@ -1,6 +1,7 @@
 """Processed records as files: MiniSEED, the table of filter corners, one page per record."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -21,10 +22,10 @@ from per_obspy.report.records import draw_records
 from per_obspy.report.spectra import draw_spectra, draw_state_space
 from per_obspy.results.station_summary import write_processed_table
 from per_obspy.results.table_files import write_rejected
-from per_obspy.runs.stations import all_rejections, finished_stations, station_jobs
+from per_obspy.runs.stations import all_rejections, finished_stations, station_tasks
 from per_obspy.runs.tasks.executor import opened_executor
 from per_obspy.runs.tasks.parallel import Workers
-from per_obspy.runs.tasks.station import FinishedStation, Products, StationJob
+from per_obspy.runs.tasks.station import FinishedStation, Products, StationTask
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 STATIONS, STRUCTURES = "stations", "structures"
@@ -91,18 +92,18 @@ def process_records(
     remove_dead_parts(folder)
     found = find_path_sources(sources)
     product = drawn_records_shard if report else records_shard
-    jobs = [
-        job._replace(shard=job.shard.with_suffix(".mseed"), product=product)
-        for job in station_jobs(
+    tasks = [
+        replace(task, shard=task.shard.with_suffix(".mseed"), product=product)
+        for task in station_tasks(
             found.stations, folder / STATIONS, settings, Spectra(), event=earthquake
         )
     ]
     with opened_executor(Engine(), workers, folder) as used:
-        done = finished_stations(jobs, used)
+        done = finished_stations(tasks, used)
 
     # Tables of all records
     rejected = all_rejections(found.rejected, done)
-    records = _records(jobs)
+    records = _records(tasks)
     descriptions = {
         path.relative_to(folder).as_posix(): read_descriptions(path) or [] for path in records
     }
@@ -112,54 +113,54 @@ def process_records(
     return Processed(done, tuple(rejected), (*tables, *records))
 
 
-def _records(jobs: Sequence[StationJob]) -> list[Path]:
-    """Return the MiniSEED files of finished jobs, those of structures last."""
-    shards = [job.shard for job in jobs]
-    structures = [_structure(job) for job in jobs]
+def _records(tasks: Sequence[StationTask]) -> list[Path]:
+    """Return the MiniSEED files of finished tasks, those of structures last."""
+    shards = [task.shard for task in tasks]
+    structures = [_structure(task) for task in tasks]
     return [path for path in (*shards, *structures) if path.exists()]
 
 
-def _structure(job: StationJob) -> Path:
+def _structure(task: StationTask) -> Path:
     """Return the path for the records of a station's sensors in structures."""
-    return job.shard.parent.with_name(STRUCTURES) / job.shard.name
+    return task.shard.parent.with_name(STRUCTURES) / task.shard.name
 
 
-def records_shard(job: StationJob, stream: Stream, source: Source | None) -> Products:
+def records_shard(task: StationTask, stream: Stream, source: Source | None) -> Products:
     """Write the processed records of a station as its station file, structures in another file."""
     ground, structure = split_structures(taken(stream))
-    clean, unfit = process_station(chain(taken(ground), structure), job.processing, source)
-    return _write_records(job, clean, unfit, _write_structure(job, structure, source))
+    clean, unfit = process_station(chain(taken(ground), structure), task.processing, source)
+    return _write_records(task, clean, unfit, _write_structure(task, structure, source))
 
 
-def drawn_records_shard(job: StationJob, stream: Stream, source: Source | None) -> Products:
+def drawn_records_shard(task: StationTask, stream: Stream, source: Source | None) -> Products:
     """Write the station file as :func:`records_shard` does, and draw one page per record."""
-    clean, unfit = process_station(stream, job.processing, source)
+    clean, unfit = process_station(stream, task.processing, source)
     # Each page shows a record before and after
-    pages = job.shard.with_suffix(".pdf")
+    pages = task.shard.with_suffix(".pdf")
     if clean:
-        traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
+        traces = ((trace, before_processing(stream, trace, task.processing)) for trace in clean)
         draw_records(traces, pages)
     _, structure = split_structures(stream)
-    products = _write_records(job, clean, unfit, _write_structure(job, structure, source))
+    products = _write_records(task, clean, unfit, _write_structure(task, structure, source))
     return products._replace(files=(*products.files, pages)) if clean else products
 
 
 def _write_records(
-    job: StationJob, clean: Stream, unfit: Sequence[Rejection], structure: Products
+    task: StationTask, clean: Stream, unfit: Sequence[Rejection], structure: Products
 ) -> Products:
     """Write the usable records of a station as its station file; return all its products."""
     rejected = (*unfit, *structure.rejected)
     if not clean:
         return Products(rejected, structure.files)
-    facts = write_processed(clean, job.shard)
-    return Products(rejected, (job.shard, *structure.files), facts)
+    facts = write_processed(clean, task.shard)
+    return Products(rejected, (task.shard, *structure.files), facts)
 
 
-def _write_structure(job: StationJob, structure: Stream, source: Source | None) -> Products:
+def _write_structure(task: StationTask, structure: Stream, source: Source | None) -> Products:
     """Write the records of all sensors in structures, and empty the stream."""
-    path = _structure(job)
+    path = _structure(task)
     remove_file(path)
-    instruments, rejected = process_instruments(taken(structure), job.processing, source)
+    instruments, rejected = process_instruments(taken(structure), task.processing, source)
     # All instruments in one file
     built = Stream([trace for traces in instruments for trace in traces])
     if not built:
@@ -205,9 +206,9 @@ def spectra_of(
     shards = output.with_suffix(".stations")
     remove_dead_parts(shards)
     found = find_path_sources(sources)
-    jobs = station_jobs(found.stations, shards, processing, grid)
+    tasks = station_tasks(found.stations, shards, processing, grid)
     with opened_executor(Engine(), workers, output.absolute().parent) as used:
-        done = finished_stations(jobs, used)
+        done = finished_stations(tasks, used)
     rejected = all_rejections(found.rejected, done)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))
     # The file of the region needs a station with usable records

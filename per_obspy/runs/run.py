@@ -15,8 +15,8 @@ from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress, silent
 from per_obspy.results.ranked_table import table_outputs
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.runs.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
 from per_obspy.runs.provenance import RunSettings
-from per_obspy.runs.tasks.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
 from per_obspy.runs.tasks.parallel import Workers, prepare_workers
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def run(
         _prepare_workers(settings, executor)
         from per_obspy.runs.stages import new_run
 
-        return new_run(asked, asked.context(executor, progress), fetched, head, dict(facts or {}))
+        return new_run(asked, asked.context(executor, progress), fetched, head, facts or {})
 
 
 def screen(

@@ -1,7 +1,6 @@
 """Second stage: pairs and the stations become the risk table, chunk by chunk."""
 
 import math
-import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
@@ -21,12 +20,12 @@ from per_obspy.runs.building_rows import NO_ROWS, BuildingRowsDone, building_row
 from per_obspy.runs.losses import areas_left_out, search_of_tables
 from per_obspy.runs.pairs import pair_files
 from per_obspy.runs.provenance import RunContext
-from per_obspy.runs.results.served_stations import Served
+from per_obspy.runs.record import Served
 from per_obspy.runs.stations import simulated_motion
-from per_obspy.runs.tasks.chunk import CHUNK, ChunkJob, do_chunks
+from per_obspy.runs.tasks.chunk import CHUNK, ChunkTask
 from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
+from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
-from per_obspy.runs.tasks.risk_cells import WORK, write_cells, write_texts
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.ranking import EVERY_STATE
 
@@ -144,14 +143,10 @@ def _ranked(context: RunContext, parts: Sequence[Part], facts: dict[str, str]) -
     settings, folder = context.settings, context.folder
     tables = [part.path for part in parts if part.path]
     pairs = sum(pq.read_metadata(table.absolute()).num_rows for table in tables)
-    if pairs >= settings.dataset_from:
-        risk = write_cells(parts, folder, facts, settings.dataset_cell, context.workers)
-        texts = write_texts(risk.files, folder, settings.csv_rows)
-        return risk._replace(files=[*risk.files, *texts])
+    # One file, or one per cell of very many pairs
+    cell = settings.dataset_cell if pairs >= settings.dataset_from else None
     context.progress("ranking", 0, 1)
-    risk = write_risk(tables, folder, facts, settings.csv_rows)
-    # Cells that a killed run has begun are of no use
-    shutil.rmtree(folder / WORK, ignore_errors=True)
+    risk = write_risk(tables, folder, facts, settings.csv_rows, cell)
     context.progress("ranking", 1, 1)
     return risk
 
@@ -194,8 +189,8 @@ def _parts(context: RunContext, ground: GroundFiles) -> tuple[list[Part], PairNo
     parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
     tally = CoverageTally(search_of_tables(inventory.rows))
     size = _chunk_rows(inventory.count, context.workers.count)
-    jobs = _jobs(settings, folder, ground, inventory.chunks(size), raw)
-    for part in do_chunks(jobs, context.workers):
+    tasks = _tasks(settings, folder, ground, inventory.chunks(size), raw)
+    for part in finish(tasks, context.workers):
         parts.append(part)
         rows += part.rows
         # What is left out is read back chunk by chunk, never as a whole
@@ -238,18 +233,25 @@ def _chunk_rows(count: int, workers: int) -> int:
     return min(SMALLEST_CHUNK << round(math.log2(share / SMALLEST_CHUNK)), CHUNK)
 
 
-def _jobs(
+def _tasks(
     settings: Run,
     folder: Path,
     ground: GroundFiles,
     chunks: Iterator[PairChunk],
     raw: dict[int, RawRows],
-) -> Iterator[ChunkJob]:
-    """Yield one job per chunk of the inventory, and keep its rows until it is done."""
+) -> Iterator[ChunkTask]:
+    """Yield one task per chunk of the inventory, and keep its rows until it is done."""
     for number, chunk in enumerate(chunks):
         raw[number] = chunk.rows
         part = _chunk_folder(folder) / f"{number:06}.parquet"
-        yield ChunkJob(number, chunk, ground, settings.building, settings.screening, part)
+        yield ChunkTask(
+            number=number,
+            part=part,
+            chunk=chunk,
+            ground=ground,
+            building=settings.building,
+            screening=settings.screening,
+        )
 
 
 def _chunk_folder(folder: Path) -> Path:

@@ -1,9 +1,7 @@
 """
 The stages of a run in their order, and those that are done alone.
 
-Stations and chunks of the inventory are separate jobs: a killed run continues where it stopped.
-The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
-only then the other results are complete, and a run of the same inputs is up to date.
+Stations and chunks of the inventory are separate tasks: a killed run continues where it stopped.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,47 +11,38 @@ from typing import Any
 
 from per_obspy.config import Run
 from per_obspy.errors import Rejection
-from per_obspy.files import file_hash, is_part, remove_file
+from per_obspy.files import file_hash, is_part
 from per_obspy.progress import timed
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.results.coverage import Coverage
-from per_obspy.results.ranked_table import remove_table
-from per_obspy.results.station_summary import StationSummary, write_stations
-from per_obspy.resume import write_status
+from per_obspy.results.station_summary import write_stations
 from per_obspy.runs.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.runs.inputs.preflight import check_inputs
-from per_obspy.runs.losses import losses, number_of_rows
-from per_obspy.runs.provenance import RunContext, RunSettings
-from per_obspy.runs.report import reported
-from per_obspy.runs.results.served_stations import (
-    KnownStations,
-    earlier_facts,
-    station_facts,
+from per_obspy.runs.losses import losses
+from per_obspy.runs.output_folder import (
+    RECORD,
+    SCREENING,
+    STATIONS,
+    Result,
+    file_hashes,
+    recorded,
+    software_versions,
 )
+from per_obspy.runs.provenance import RunContext, RunSettings
+from per_obspy.runs.record import KnownStations, RunRecord, earlier_facts, station_facts
+from per_obspy.runs.report import reported
 from per_obspy.runs.screening import Screened, screened
 from per_obspy.runs.stations import (
-    FoundStations,
     all_rejections,
     compared_stations,
-    find_station_jobs,
+    find_station_tasks,
     finished_stations,
     simulated_motion,
     simulated_stations,
     stations_of_earlier_run,
 )
-from per_obspy.runs.tasks.executor import engine_facts, noted_engine, opened_executor
-from per_obspy.runs.tasks.output_folder import (
-    RECORD,
-    SCREENING,
-    STATIONS,
-    UNFINISHED,
-    Result,
-    file_hashes,
-    now,
-    recorded,
-    software_versions,
-)
-from per_obspy.runs.tasks.station import FinishedStation
+from per_obspy.runs.tasks.executor import engine_facts, opened_executor
+from per_obspy.runs.tasks.station import FinishedStation, StationTask
 from per_obspy.screening.warmup import compiling
 
 
@@ -62,7 +51,7 @@ def new_run(
     context: RunContext,
     fetched: Fetched | None,
     head: dict[str, Any] | None,
-    facts: dict[str, Any],
+    facts: Mapping[str, object],
 ) -> Result:
     """
     Do a run that was not done before, whose output folder is locked.
@@ -77,21 +66,28 @@ def new_run(
         Records of FDSN services.
     head : dict or None
         Key, configuration and inputs; inputs are hashed as they are read if not given.
-    facts : dict
+    facts : mapping
         Further plain values for ``run.json``.
     """
     settings, folder = context.settings, context.folder
+    # Pairs from footprints, and everything that would stop a later stage
     drawn = write_drawn_pairs(settings, folder, context.progress)
     check_inputs(settings, folder)
-    earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
-    seconds, started = dict[str, float](), now()
-    with timed(seconds, "records"):
-        found = find_station_jobs(context, fetched)
+    record = RunRecord(name=settings.name, facts=facts, drawn=drawn).begin(folder, STATIONS)
+    with timed(record.seconds, "records"):
+        found = find_station_tasks(context, fetched)
         head = head or asked.head(fetched, found.hashes)
-    # From here on the folder describes an unfinished run
-    record = facts | _all_stages(context, found, facts)
-    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
-    return _finished_record(settings, folder, record, head, earlier_rows)
+    with opened_executor(settings.engine, context.workers, folder) as used:
+        context = replace(context, workers=used)
+        done = _done_stations(context, record, found.tasks)
+        # Only now every station has its neighbours
+        stations, trusted = compared_stations(done, found.earthquakes, settings.records)
+        record = replace(record, earthquakes=found.earthquakes).begin(folder, SCREENING)
+        # From here on no record is needed
+        rejected = all_rejections(found.rejected, stations)
+        record = _later_stages(context, record, stations, rejected, found.known)
+    hashes = _intermediate_hashes(folder, done, found.hashes)
+    return _finished(replace(record, trusted=trusted, intermediate=hashes), folder, head)
 
 
 def new_screening(asked: RunSettings, context: RunContext) -> Result:
@@ -102,22 +98,19 @@ def new_screening(asked: RunSettings, context: RunContext) -> Result:
     check_inputs(settings, folder)
     earthquakes, known = earlier_facts(folder / RECORD)
     stations, trusted = compared_stations(found, earthquakes, settings.records)
-    earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
-    started = now()
-    # A later run does everything that has changed since, whatever is recorded here
-    head = asked.head(None, {})
-    head["key"] = f"screening of stations as they were at {started}"
+    record = RunRecord(
+        name=settings.name, drawn=drawn, earthquakes=earthquakes, trusted=trusted
+    ).begin(folder, SCREENING)
     rejected = all_rejections([], stations)
     # On a cluster the folder is shared until the report is written
     with (
         opened_executor(settings.engine, context.workers, folder) as used,
         compiling(context.progress),
     ):
-        record = _later_stages(replace(context, workers=used), stations, rejected)
-    record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
-    record["trusted"] = trusted
-    _add_stations(record, known)
-    return _finished_record(settings, folder, record, head, earlier_rows)
+        record = _later_stages(replace(context, workers=used), record, stations, rejected, known)
+    # A later run does everything that has changed since, whatever is recorded here
+    key = f"screening of stations as they were at {record.started}"
+    return _finished(record, folder, {**asked.head(None, {}), "key": key})
 
 
 def new_report(context: RunContext, record: dict[str, Any]) -> Result:
@@ -148,145 +141,97 @@ def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
     return [station for station in stations if station.shard is not None]
 
 
-def _all_stages(
-    context: RunContext, found: FoundStations, facts: Mapping[str, object]
-) -> dict[str, Any]:
-    """Do the stations and the stages after them, and return their part of ``run.json``."""
-    settings, folder = context.settings, context.folder
-    seconds = dict[str, float]()
-    with opened_executor(settings.engine, context.workers, folder) as used:
-        noted = noted_engine(folder / RECORD, used.executor)
-        with timed(seconds, "stations"), compiling(used.progress), noted:
-            used.progress("stations", 0, len(found.jobs))
-            done = finished_stations(found.jobs, used)
-        # Only now every station has its neighbours
-        stations, trusted = compared_stations(done, found.earthquakes, settings.records)
-        _begun(folder, settings, SCREENING, found.earthquakes, facts)
-        # From here on no record is needed
-        rejected = all_rejections(found.rejected, stations)
-        record = _later_stages(replace(context, workers=used), stations, rejected)
-    record |= {"earthquakes": found.earthquakes, "trusted": trusted}
-    _add_stations(record, found.known)
-    record["intermediate"] = _intermediate_hashes(folder, done, found.hashes)
-    return {**record, "seconds": seconds | record["seconds"]}
-
-
-def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations, with their pairs, to ``run.json``."""
-    used, served = record.pop("used"), record.pop("served")
-    record["stations"] = station_facts(known, used, served, record["counts"])
-
-
-def _begun(
-    folder: Path,
-    settings: Run,
-    stage: str,
-    earthquakes: Sequence[Any] = (),
-    facts: Mapping[str, object] | None = None,
-) -> int | None:
-    """Record a run as unfinished, and return the number of rows of the pair tables before it."""
-    rows = number_of_rows(folder / RECORD)
-    begun: dict[str, Any] = {
-        **(facts or {}),
-        "name": settings.name,
-        "state": UNFINISHED,
-        "stage": stage,
-        "earlier_rows": rows,
-    }
-    # The summary states the earthquake before the run is finished
-    begun["earthquakes"] = list(earthquakes)
-    write_status(folder / RECORD, "", {}, begun, indent=1)
-    # A table of an earlier run would be taken for one of this run
-    remove_table(folder)
-    for name in ("risk", "rows", "buildings"):
-        for end in (".parquet", ".csv", ".columns.csv"):
-            remove_file(folder / f"{name}{end}")
-    return rows
-
-
-def _finished_record(
-    settings: Run,
-    folder: Path,
-    record: dict[str, Any],
-    head: dict[str, Any],
-    earlier_rows: int | None,
-) -> Result:
-    """Write ``run.json``, with sentences on losses of rows."""
-    lost = losses(settings, record["counts"], earlier_rows)
-    # What failed unexpectedly is done again by the next run, and files that waited are taken
-    waited = record["stations"]["waiting"]
-    key = "" if record["failed"] or waited else head["key"]
-    return recorded(folder / RECORD, {**record, "losses": lost, **head, "key": key})
+def _done_stations(
+    context: RunContext, record: RunRecord, tasks: Sequence[StationTask]
+) -> list[FinishedStation]:
+    """Do the stations that are not done yet, while the kernels of later stages are compiled."""
+    workers = context.workers
+    with (
+        timed(record.seconds, "stations"),
+        compiling(workers.progress),
+        record.with_engine(context.folder, workers.executor),
+    ):
+        workers.progress("stations", 0, len(tasks))
+        return finished_stations(tasks, workers)
 
 
 def _later_stages(
-    context: RunContext, stations: Sequence[FinishedStation], rejected: Sequence[Rejection]
-) -> dict[str, Any]:
-    """Do the stages after the stations and return their part of ``run.json``."""
+    context: RunContext,
+    record: RunRecord,
+    stations: Sequence[FinishedStation],
+    rejected: Sequence[Rejection],
+    known: KnownStations,
+) -> RunRecord:
+    """Do the stages after the stations, and return the record with their facts."""
     settings, folder, executor = context.settings, context.folder, context.workers.executor
-    seconds, usable = dict[str, float](), _usable(stations)
-    # The risk table, then everything that is read from it
-    with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
+    usable = _usable(stations)
+    # The risk table and the rows of buildings
+    with timed(record.seconds, "screening"), record.with_engine(folder, executor):
         found = screened(context, usable, rejected)
-        table = _write_stations(usable, rejected, found, folder)
-    with timed(seconds, "report"):
-        made = reported(context, usable, found.coverage)
-        outputs = [*found.outputs, *table.files, *made.outputs]
-    outcome = _outcome(found, stations)
-
-    return {
-        "name": settings.name,
-        **outcome,
+        spectra = [station.spectra for station in usable if station.spectra is not None]
+        table = write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
+    # Everything that is read from them
+    with timed(record.seconds, "report"):
+        report = reported(context, usable, found.coverage)
+    record = _with_counts(record, settings, found, stations, known)
+    return replace(
+        record,
         # A picture or layer that failed is made by the next run
-        "failed": outcome["failed"] or bool(made.faults),
-        "faults": made.faults,
-        "used": _names_of(usable, found),
-        "served": found.served,
-        **engine_facts(executor),
-        "simulated": simulated_motion(settings, usable),
-        "warnings": table.warnings,
-        "pair_tables": found.pair_tables.as_record(),
-        "coverage": found.coverage.as_record(),
-        "outputs": file_hashes(folder, outputs),
-        "versions": software_versions(),
-        "seconds": seconds,
-    }
+        failed=record.failed or bool(report.faults),
+        faults=report.faults,
+        engine=engine_facts(executor),
+        simulated=simulated_motion(settings, usable),
+        warnings=table.warnings,
+        pair_tables=found.pair_tables.as_record(),
+        coverage=found.coverage.as_record(),
+        versions=software_versions(),
+        outputs=file_hashes(folder, [*found.outputs, *table.files, *report.outputs]),
+    )
 
 
-def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
-    """Return the names of the stations with known coordinates, which can serve pairs."""
-    unplaced = {rejection.name for rejection in found.unplaced}
-    return [station.station for station in usable if station.station not in unplaced]
-
-
-def _outcome(found: Screened, stations: Sequence[FinishedStation]) -> dict[str, Any]:
-    """Return state and counts of a run; rejections make its result partial."""
-    counts = found.counts
-    rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
+def _with_counts(
+    record: RunRecord,
+    settings: Run,
+    found: Screened,
+    stations: Sequence[FinishedStation],
+    known: KnownStations,
+) -> RunRecord:
+    """Return the record with state, counts, served stations and lost rows of a screening."""
     usable = _usable(stations)
     # Stations that were done before, and those of simulated motion, are counted apart
-    of_stations = {
+    counts = {
         "stations": len(usable),
         "stations_resumed": sum(station.resumed for station in stations),
         "stations_simulated": simulated_stations(usable),
+        **found.counts,
     }
-    return {
-        "state": "complete" if counts["pairs"] else "nothing_usable",
-        "partial": any(rejections),
-        "failed": found.failed or any(station.failed for station in stations),
-        "counts": {**of_stations, **counts},
-    }
+    unplaced = {rejection.name for rejection in found.unplaced}
+    serving = [station.station for station in usable if station.station not in unplaced]
+    # Rejections make a result partial
+    return replace(
+        record,
+        state="complete" if counts["pairs"] else "nothing_usable",
+        partial=any(count for name, count in counts.items() if name.startswith("rejected_")),
+        failed=found.failed or any(station.failed for station in stations),
+        counts=counts,
+        stations=station_facts(known, serving, found.served, counts),
+        losses=losses(settings, counts, record.earlier_rows),
+    )
 
 
-def _write_stations(
-    usable: Sequence[FinishedStation],
-    rejected: Sequence[Rejection],
-    found: Screened,
-    folder: Path,
-) -> StationSummary:
-    """Write the table of the stations with the pairs that each serves."""
-    spectra = [station.spectra for station in usable if station.spectra is not None]
-    return write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
+def _finished(record: RunRecord, folder: Path, head: Mapping[str, Any]) -> Result:
+    """Write the record of a finished run with its key, configuration and inputs."""
+    assert record.stations is not None  # of the last stage
+    # What failed unexpectedly is done again by the next run, and files that waited are taken
+    key = "" if record.failed or record.stations["waiting"] else head["key"]
+    finished = replace(
+        record,
+        stage=None,
+        earlier_rows=None,
+        configuration=head["configuration"],
+        inputs=head["inputs"],
+    )
+    return finished.write(folder, key)
 
 
 def _intermediate_hashes(

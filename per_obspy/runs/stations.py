@@ -20,10 +20,10 @@ from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
 from per_obspy.runs.provenance import RunContext
+from per_obspy.runs.record import KnownStations
 from per_obspy.runs.results.run_facts import with_event
-from per_obspy.runs.results.served_stations import KnownStations
-from per_obspy.runs.tasks.parallel import Workers
-from per_obspy.runs.tasks.station import FinishedStation, StationJob, do_stations, earlier_station
+from per_obspy.runs.tasks.parallel import Workers, finish
+from per_obspy.runs.tasks.station import FinishedStation, StationTask, earlier_station
 from per_obspy.screening.amplitudes import Earthquake
 from per_obspy.screening.site_motion import hypocentre_of
 from per_obspy.screening.station_comparison import Comparison, compare_stations
@@ -39,7 +39,7 @@ class FoundStations(NamedTuple):
 
     Attributes
     ----------
-    jobs : list of StationJob
+    tasks : list of StationTask
         One per station.
     rejected : list of Rejection
         Files and records of the sources that cannot be used.
@@ -51,14 +51,14 @@ class FoundStations(NamedTuple):
         Stations that are expected, and those of which records came.
     """
 
-    jobs: list[StationJob]
+    tasks: list[StationTask]
     rejected: list[Rejection]
     hashes: dict[Path, str]
     earthquakes: list[dict[str, object]]
     known: KnownStations = KnownStations()
 
 
-def find_station_jobs(context: RunContext, fetched: Fetched | None) -> FoundStations:
+def find_station_tasks(context: RunContext, fetched: Fetched | None) -> FoundStations:
     """
     Find the stations of a run; simulated records are written into the output folder first.
 
@@ -89,24 +89,24 @@ def find_station_jobs(context: RunContext, fetched: Fetched | None) -> FoundStat
         _note_simulation(scenario, folder, found.hashes)
     progress("finding records", 1, 1)
 
-    # One job per station
-    jobs = station_jobs(
+    # One task per station
+    tasks = station_tasks(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
     earthquakes = with_event(found.earthquakes, found.event and found.event.event)
     known = KnownStations.of(found.expected, found.stations, found.waiting)
-    return FoundStations(jobs, list(found.rejected), found.hashes, earthquakes, known)
+    return FoundStations(tasks, list(found.rejected), found.hashes, earthquakes, known)
 
 
-def station_jobs(
+def station_tasks(
     stations: Mapping[str, StationSource],
     shards: Path,
     processing: Processing,
     spectra: Spectra,
     event: EventFile | None = None,
-) -> list[StationJob]:
+) -> list[StationTask]:
     """
-    Return one job per station, sorted by name, which writes a station file.
+    Return one task per station, sorted by name, which writes a station file.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def station_jobs(
         If a station file would be outside of that folder, because a link leads out of it.
     """
     return [
-        StationJob(
+        StationTask(
             station=name,
             source=source.files,
             inventory=source.inventory,
@@ -152,9 +152,9 @@ def file_stem(station: str) -> str:
     return station.removeprefix(".") or "unnamed"
 
 
-def finished_stations(jobs: Sequence[StationJob], workers: Workers) -> list[FinishedStation]:
+def finished_stations(tasks: Sequence[StationTask], workers: Workers) -> list[FinishedStation]:
     """
-    Do the jobs and return every station, sorted by name.
+    Do the tasks and return every station, sorted by name.
 
     Raises
     ------
@@ -164,12 +164,12 @@ def finished_stations(jobs: Sequence[StationJob], workers: Workers) -> list[Fini
     finished = []
     # A failure to write is no property of the stations that wait
     try:
-        for station in do_stations(jobs, workers):
+        for station in finish(tasks, workers):
             finished.append(station)
-            workers.progress("stations", len(finished), len(jobs))
+            workers.progress("stations", len(finished), len(tasks))
     except WriteError as error:
         done = {station.station for station in finished}
-        waiting = {job.station for job in jobs} - done
+        waiting = {task.station for task in tasks} - done
         reason = f"{error.reason}; {_waiting_stations(sorted(waiting))}"
         raise WriteError(error.path, reason) from error
     return sorted(finished, key=lambda station: station.station)

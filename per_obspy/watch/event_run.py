@@ -28,8 +28,8 @@ from per_obspy.records.fdsn.download import RECORDS
 from per_obspy.records.fdsn.web import PassingFault
 from per_obspy.records.file_list import file_states, files_below, growing_files
 from per_obspy.results.ranked_table import table_outputs
+from per_obspy.runs.output_folder import Result
 from per_obspy.runs.run import run
-from per_obspy.runs.tasks.output_folder import Result
 from per_obspy.watch.event_feed import present_event
 from per_obspy.watch.event_settings import (
     Watcher,

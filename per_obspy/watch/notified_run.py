@@ -16,8 +16,8 @@ from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of, short
 from per_obspy.files import written_whole
 from per_obspy.progress import Progress, silent
 from per_obspy.results.ranked_table import table_files
+from per_obspy.runs.output_folder import Result, now
 from per_obspy.runs.run import run
-from per_obspy.runs.tasks.output_folder import Result, now
 from per_obspy.watch.logs import without_secrets
 from per_obspy.watch.notification import Message, notify
 

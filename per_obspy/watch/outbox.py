@@ -14,7 +14,7 @@ from typing import Any
 
 from per_obspy.errors import PerError, shortened
 from per_obspy.files import remove_file, written_whole
-from per_obspy.runs.tasks.output_folder import RECORD, Result
+from per_obspy.runs.output_folder import RECORD, Result
 from per_obspy.watch.event_settings import Watcher
 from per_obspy.watch.notified_run import notify_failure, notify_result
 from per_obspy.watch.revisions import WORK, revision_folder

@@ -19,8 +19,8 @@ from per_obspy.names import inside
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import table_files, table_outputs
 from per_obspy.resume import Status, StatusError, read_status, write_status
+from per_obspy.runs.output_folder import RECORD
 from per_obspy.runs.provenance import CONFIGURATION
-from per_obspy.runs.tasks.output_folder import RECORD
 
 #: Name of the table in a revision.
 CHANGES = "changes.csv"

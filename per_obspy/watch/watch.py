@@ -17,7 +17,7 @@ from per_obspy import termination
 from per_obspy.config import Run, Watch
 from per_obspy.errors import PerError, TryLater, shortened
 from per_obspy.progress import Progress, silent
-from per_obspy.runs.tasks.output_folder import locked_folder
+from per_obspy.runs.output_folder import locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
 from per_obspy.watch.event_settings import Watcher, watch_of
 from per_obspy.watch.health import WatchStatus, write_status

@@ -20,12 +20,6 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import file_hash
 from per_obspy.results.parts import TOGETHER, part_rows, text_columns
-from per_obspy.results.ranked_cells import (
-    BATCH,
-    CellRows,
-    arranged_rows,
-    arranged_writer,
-)
 from per_obspy.results.ranked_table import ROWS
 from per_obspy.threads import use_one_thread
 
@@ -76,23 +70,16 @@ def main(part: Path) -> None:
     texts, rows = text_columns(table.schema), table.num_rows
     with tempfile.TemporaryDirectory() as room:
         disk_speed(Path(room) / "disk")
-        parquet, arrow = Path(room) / "part.parquet", Path(room) / "part.arrow"
+        parquet = Path(room) / "part.parquet"
 
         def parquet_in_groups(size: int) -> None:
             pq.write_table(table, parquet, row_group_size=size, use_dictionary=texts)
-
-        def arranged() -> None:
-            with arranged_writer(arrow, table.schema) as writer:
-                writer.write_table(table, BATCH)
 
         timed("table written (Parquet)", rows, parquet, lambda: parquet_in_groups(ROWS))
         timed("part written (Parquet)", rows, parquet, lambda: parquet_in_groups(TOGETHER))
         timed(
             "part read (Parquet)", rows, parquet, lambda: drained(part_rows(parquet, table.schema))
         )
-        timed("arranged written (LZ4)", rows, arrow, arranged)
-        some = CellRows(arrow, 0, rows, 0)
-        timed("arranged read (LZ4)", rows, arrow, lambda: drained(arranged_rows(some)))
         timed("hash", rows, parquet, lambda: file_hash(parquet))
 
 

@@ -17,19 +17,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from per_obspy.files import file_hash
 from per_obspy.results.parts import write_part
 from per_obspy.results.ranked_table import table_files
 from per_obspy.results.risk import write_risk
-from per_obspy.resume import write_status
-from per_obspy.runs.tasks.parallel import Workers
-from per_obspy.runs.tasks.parts import Part
-from per_obspy.runs.tasks.risk_cells import write_cells, write_texts
 from per_obspy.screening.ranking import in_order
 
 
-def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Part:
-    """Write one part and its status, and return it."""
+def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Path:
+    """Write one part, and return its file."""
     draw = np.random.default_rng(number)
     first = number * rows
     table = pd.DataFrame(
@@ -47,19 +42,7 @@ def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Part:
     others = pd.DataFrame(draw.random((rows, numbers)), columns=[f"x{i}" for i in range(numbers)])
     path = folder / f"{number:06}.parquet"
     write_part(in_order(pd.concat([table, others], axis=1)), number, path)
-    status = path.with_suffix(".json")
-    write_status(status, "made up", {path.name: file_hash(path)}, {"rejected": []})
-    return Part(number, rows, path, status, resumed=False)
-
-
-def write_table(parts: list[Part], folder: Path, cell: float) -> None:
-    """Write the risk table in one file, or by cell."""
-    facts = {"name": "made up"}
-    if not cell:
-        write_risk([part.path for part in parts if part.path], folder, facts, 100_000)
-        return
-    write_cells(parts, folder, facts, cell, Workers(1))
-    write_texts(table_files(folder), folder, 100_000)
+    return path
 
 
 def main(parts: int, rows: int, numbers: int, cell: float) -> None:
@@ -70,12 +53,11 @@ def main(parts: int, rows: int, numbers: int, cell: float) -> None:
         chunks.mkdir()
         files = [write_made_up(chunks, number, rows, numbers) for number in range(parts)]
         before, start = resource.getrusage(resource.RUSAGE_SELF), time.process_time()
-        write_table(files, folder, cell)
+        write_risk(files, folder, {"name": "made up"}, 100_000, cell or None)
         seconds = time.process_time() - start
         used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         disk = [
-            sum(path.stat().st_size for path in some) / 1e9
-            for some in ([part.path for part in files if part.path], table_files(folder))
+            sum(path.stat().st_size for path in some) / 1e9 for some in (files, table_files(folder))
         ]
     print(
         f"{parts * rows:.0e} pairs in {parts} parts, {numbers + 8} columns: {seconds:.1f} s "

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from figures import note
@@ -44,7 +45,7 @@ def one_station(records: Path, folder: Path) -> tuple[float, dict[str, float], i
     """Return processor time of a station, that of its parts, and samples, the fastest of some."""
     from per_obspy.config import Processing, Records, Spectra
     from per_obspy.records.sources import find_sources
-    from per_obspy.runs.stations import station_jobs
+    from per_obspy.runs.stations import station_tasks
     from per_obspy.runs.tasks import station as work
 
     parts: dict[str, float] = {}
@@ -66,11 +67,11 @@ def one_station(records: Path, folder: Path) -> tuple[float, dict[str, float], i
     found = find_sources(Records(folder=records, event=records / "event.xml"), None)
     output = folder / "alone"
     output.mkdir(exist_ok=True)
-    jobs = station_jobs(found.stations, output, Processing(), Spectra(), found.event)
+    jobs = station_tasks(found.stations, output, Processing(), Spectra(), found.event)
     fastest, samples = 1e9, 0
     for job in jobs[: ALONE + 1]:
         start = time.process_time()
-        done = work.do_station(job._replace(key="benchmark"))
+        done = replace(job, key="benchmark").do()
         fastest = min(fastest, time.process_time() - start)
         samples = max(samples, work.read_spectra(done.shard).sizes["time"] if done.shard else 0)
     return fastest, parts, samples

@@ -9,8 +9,8 @@ import pytest
 
 from per_obspy.buildings.columns import ROWS
 from per_obspy.runs.tasks import building_rows
-from per_obspy.runs.tasks.building_rows import RowsJob, do_row_chunks
-from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.building_rows import RowsTask
+from per_obspy.runs.tasks.parallel import Workers, finish
 from per_obspy.runs.tasks.parts import rejections
 
 
@@ -26,13 +26,13 @@ def contacts(**changes):
 def jobs(tmp_path):
     def jobs(**changes):
         part = tmp_path / "rows" / "000000.parquet"
-        return [RowsJob(0, contacts(**changes), None, part)]
+        return [RowsTask(number=0, contacts=contacts(**changes), station=None, part=part)]
 
     return jobs
 
 
 def done(jobs):
-    return list(do_row_chunks(jobs, Workers(1)))
+    return list(finish(jobs, Workers(1)))
 
 
 def test_without_a_record_there_is_no_history(jobs):
@@ -70,5 +70,5 @@ def test_a_chunk_that_fails_has_a_reason_for_every_row_and_is_done_again(jobs, m
 
 def test_a_chunk_is_named_by_its_rows(jobs):
     (job,) = jobs()
-    assert building_rows._name(job) == "rows of buildings from R-a to R-c"
+    assert job.name == "rows of buildings from R-a to R-c"
     assert job.part == Path(job.part)

@@ -18,7 +18,7 @@ import pandas as pd
 import pytest
 
 import per_obspy
-from per_obspy.runs.tasks.output_folder import locked_folder
+from per_obspy.runs.output_folder import locked_folder
 
 from ..runs.small_run import plain_reports
 

@@ -23,11 +23,11 @@ from pyarrow import parquet
 from per_obspy.config import Processing
 from per_obspy.errors import FolderInUse
 from per_obspy.results.table_files import rounded_table
+from per_obspy.runs.output_folder import Result
 from per_obspy.runs.process import process_records
 from per_obspy.runs.run import report, run, screen
-from per_obspy.runs.tasks import station as jobs
-from per_obspy.runs.tasks.output_folder import Result
 from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.station import StationTask
 from per_obspy.screening.ranking import STATES
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
@@ -263,8 +263,8 @@ def test_a_killed_run_goes_on_where_it_stopped(copied, monkeypatch):
         return work(job)
 
     # the run is interrupted, then goes on with two stations done
-    work = jobs.do_station
-    monkeypatch.setattr(jobs, "do_station", dies_at_the_third)
+    work = StationTask.do
+    monkeypatch.setattr(StationTask, "do", dies_at_the_third)
     with pytest.raises(KeyboardInterrupt):
         run(copied / "run.toml", executor=InProcess())
     assert json.loads((copied / "out" / "run.json").read_text())["state"] == "unfinished"

@@ -14,11 +14,11 @@ from per_obspy.records.sources import StationSource
 from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.stations import (
     all_rejections,
-    find_station_jobs,
+    find_station_tasks,
     finished_stations,
     simulated_motion,
     simulated_stations,
-    station_jobs,
+    station_tasks,
     stations_of_earlier_run,
 )
 from per_obspy.runs.tasks.parallel import Workers
@@ -46,7 +46,7 @@ def found(settings):
         if done == total:
             stages.append(stage)
 
-    return stages, find_station_jobs(
+    return stages, find_station_tasks(
         RunContext(settings, settings.output, Workers(1, progress=progress)), None
     )
 
@@ -147,7 +147,7 @@ def test_an_earlier_run_has_its_stations(settings):
 def test_jobs_are_sorted_and_named_by_their_stations(tmp_path):
     source = StationSource((), (), None, partial(read_station))
     stations = {"XX.B": source, ".A": source, "XX.A": source}
-    jobs = station_jobs(stations, tmp_path, Processing(), Spectra())
+    jobs = station_tasks(stations, tmp_path, Processing(), Spectra())
     # a station without network is no hidden file
     assert [job.shard.name for job in jobs] == ["A.nc", "XX.A.nc", "XX.B.nc"]
 

@@ -11,7 +11,7 @@ import pytest
 
 from per_obspy.files import file_hash
 from per_obspy.resume import write_status as write_record
-from per_obspy.runs.tasks.output_folder import file_hashes
+from per_obspy.runs.output_folder import file_hashes
 from per_obspy.watch import health
 from per_obspy.watch.health import WatchStatus, folder_health, write_status
 

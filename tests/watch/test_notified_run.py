@@ -7,7 +7,7 @@ import pytest
 
 from per_obspy.config import Notify, Run
 from per_obspy.errors import CatalogError
-from per_obspy.runs.tasks.output_folder import Result
+from per_obspy.runs.output_folder import Result
 from per_obspy.watch import notified_run as module
 from per_obspy.watch.notified_run import class_counts, notified_run, notify_result
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.errors import CatalogError, WriteError
-from per_obspy.runs.tasks.output_folder import file_hashes
+from per_obspy.runs.output_folder import file_hashes
 from per_obspy.watch import revisions
 from per_obspy.watch.revisions import (
     content_of,

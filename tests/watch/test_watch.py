@@ -29,7 +29,7 @@ from per_obspy.config import Notify, Reach
 from per_obspy.errors import CatalogError, FolderInUse, ServiceError, TryLater, WriteError
 from per_obspy.files import file_hash
 from per_obspy.records.fdsn.web import PassingFault
-from per_obspy.runs.inputs.described_runs import result_facts
+from per_obspy.runs.inputs.description import describe
 from per_obspy.runs.run import run
 from per_obspy.watch import event_run, watch
 from per_obspy.watch.health import folder_health, read_status
@@ -361,7 +361,7 @@ def test_only_what_changes_is_computed(city, server, simulation, monkeypatch):
     assert [count["stations_resumed"] for count in counts] == [0, 1, 2]
     assert [count["chunks_resumed"] for count in counts] == [0, 0, counts[2]["chunks"]]
     assert counts[2]["row_chunks_resumed"] == counts[2]["row_chunks"] > 0
-    described = dict(result_facts(city.event() / "latest").lines)
+    described = dict(describe(str(city.event() / "latest")).lines)
     assert described["earthquake"] == "2000-01-01T00:00:00, 2 stations"
     # People see which revision of which earthquake they have
     for number, name in enumerate(city.revisions()[:2], start=1):

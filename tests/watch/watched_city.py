@@ -14,7 +14,7 @@ from per_obspy.config import Run, Scenario
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations
-from per_obspy.runs.tasks.output_folder import Result, file_hashes, recorded
+from per_obspy.runs.output_folder import Result, file_hashes, recorded
 from per_obspy.simulation.buildings import simulated_pairs
 from per_obspy.simulation.earthquake import Simulation, simulate
 from per_obspy.watch.event_settings import read_settings

@@ -1,1 +1,1 @@
-"""Parallel jobs, one per station or chunk of pairs, that resume after an interruption."""
+"""Resumable tasks of a run, one per station or chunk, on processes or a cluster."""

@@ -1,9 +1,8 @@
 """Work on one chunk of rows of buildings: whole rows of one station, and their exact histories."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -13,66 +12,84 @@ from per_obspy.buildings.tables import write_rows_part
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.runs.tasks.ground_files import StationFile, read_station_once
-from per_obspy.runs.tasks.parallel import Work, Workers
-from per_obspy.runs.tasks.parts import Part, do_parts, record_part, rows_hash
+from per_obspy.runs.tasks.parts import Part, PartTask, rows_hash
 from per_obspy.screening.values import Columns, chosen, components
 from per_obspy.spectra.station import lacks_azimuths
 
 
-class RowsJob(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class RowsTask(PartTask):
     """
-    One chunk to do.
+    One chunk of rows of buildings.
 
     Attributes
     ----------
-    number : int
-        Place of the chunk.
     contacts : Table
         Contacts of whole rows, one after the other, with the columns of their interfaces that are
         known, and those of ``histories.NEEDED``.
     station : StationFile or None
         Whose record they are followed under; None: no history is computed.
-    part : Path
-        Where the interfaces go.
-    key : str
-        Hash of everything on which the part depends; :func:`do_row_chunks` computes it.
     """
 
-    number: int
     contacts: pa.Table
     station: StationFile | None
-    part: Path
-    key: str = ""
 
     @property
     def rows(self) -> int:
         """Number of contacts."""
         return int(self.contacts.num_rows)
 
+    @property
+    def name(self) -> str:
+        """First and last row."""
+        rows = self.contacts["row_id"]
+        return f"rows of buildings from {rows[0]} to {rows[-1]}"
 
-def do_row_chunks(jobs: Iterable[RowsJob], workers: Workers) -> Iterator[Part]:
-    """Yield the part of every chunk as it is finished, as `parts.do_parts` does."""
-    keyed = (job._replace(key=_key(job)) for job in jobs)
-    yield from do_parts(keyed, Work(do_rows, _failed, _name), workers)
+    def content_hash(self) -> str:
+        """Return the hash of all inputs of the part."""
+        station = self.station.hash if self.station else ""
+        return rows_hash([version("per_obspy"), station], self.contacts)
 
+    def do(self) -> Part:
+        """Follow the rows of the chunk, write its part and status, and return the part."""
+        remove_file(self.part)
+        contacts = _columns(self.contacts)
+        if self.station is None:
+            return self._write(contacts, no_outcomes(self.rows), ())
+        dataset = read_station_once(self.station.shard, self.station.hash)
+        if lacks_azimuths(dataset):
+            reason = f"the azimuths of the horizontals of {dataset['station'].item()} are unknown"
+            return self._reject_all(reason)
+        # Along a single horizontal whatever the axis: it counts as north
+        one_horizontal = dataset.sizes["horizontal"] == 1
+        if one_horizontal:
+            contacts["flags"] = _flagged(contacts["flags"], "one_horizontal")
+        axis = np.zeros(self.rows) if one_horizontal else contacts["azimuth"]
+        outcomes, rejected = _known_outcomes(components(dataset), contacts | {"axis": axis})
+        return self._write(contacts, outcomes, rejected)
 
-def do_rows(job: RowsJob) -> Part:
-    """Follow the rows of a chunk, write its part and status, and return the finished part."""
-    remove_file(job.part)
-    contacts = _columns(job.contacts)
-    if job.station is None:
-        return _record(job, contacts, no_outcomes(job.contacts.num_rows), ())
-    dataset = read_station_once(job.station.shard, job.station.hash)
-    if lacks_azimuths(dataset):
-        reason = f"the azimuths of the horizontals of {dataset['station'].item()} are unknown"
-        return _reject_all(job, reason)
-    # Along a single horizontal whatever the axis: it counts as north
-    one_horizontal = dataset.sizes["horizontal"] == 1
-    if one_horizontal:
-        contacts["flags"] = _flagged(contacts["flags"], "one_horizontal")
-    axis = np.zeros(job.contacts.num_rows) if one_horizontal else contacts["azimuth"]
-    outcomes, rejected = _known_outcomes(components(dataset), contacts | {"axis": axis})
-    return _record(job, contacts, outcomes, rejected)
+    def failed(self, reason: str) -> Part:
+        """Return a part without histories after a failure; the next run repeats it."""
+        return replace(self, key="")._reject_all(reason)._replace(failed=True)
+
+    def _reject_all(self, reason: str) -> Part:
+        """Write a part of which no row has a history, for the same reason."""
+        names = dict.fromkeys(self.contacts["row_id"].to_pylist())
+        rejected = [Rejection("row", str(name), "", None, (reason,)) for name in names]
+        return self._write(_columns(self.contacts), no_outcomes(self.rows), rejected)
+
+    def _write(self, contacts: Columns, outcomes: Columns, rejected: Sequence[Rejection]) -> Part:
+        """Write the part, its status after it, and return the part."""
+        names, flags = contacts["row_id"], contacts["flags"]
+        # What holds for one contact of a row holds for all of it
+        raised = {
+            "values_reconciled": np.isin(names, names[outcomes["reconciled"]]),
+            "no_history": np.isin(names, [rejection.name for rejection in rejected]),
+        }
+        for name, rows in raised.items():
+            flags = np.where(rows, _flagged(flags, name), flags)
+        write_rows_part({**contacts, **outcomes, "flags": flags}, self.part)
+        return self.record(rejected)
 
 
 def _columns(table: pa.Table) -> Columns:
@@ -121,43 +138,3 @@ def _outcomes(
 def _flagged(flags: np.ndarray, name: str) -> np.ndarray:
     """Add a flag to texts of flags."""
     return np.array([f"{text} {name}".strip() for text in flags.tolist()], dtype=object)
-
-
-def _record(
-    job: RowsJob, contacts: Columns, outcomes: Columns, rejected: Sequence[Rejection]
-) -> Part:
-    """Write a part, its status after it, and return the part."""
-    names, flags = contacts["row_id"], contacts["flags"]
-    # What holds for one contact of a row holds for all of it
-    raised = {
-        "values_reconciled": np.isin(names, names[outcomes["reconciled"]]),
-        "no_history": np.isin(names, [rejection.name for rejection in rejected]),
-    }
-    for name, rows in raised.items():
-        flags = np.where(rows, _flagged(flags, name), flags)
-    write_rows_part({**contacts, **outcomes, "flags": flags}, job.part)
-    return record_part(job, rejected)
-
-
-def _key(job: RowsJob) -> str:
-    """Return the hash of all inputs of the part."""
-    station = job.station.hash if job.station else ""
-    return rows_hash([version("per_obspy"), station], job.contacts)
-
-
-def _name(job: RowsJob) -> str:
-    """Return the name of a chunk in messages."""
-    rows = job.contacts["row_id"]
-    return f"rows of buildings from {rows[0]} to {rows[-1]}"
-
-
-def _failed(job: RowsJob, reason: str) -> Part:
-    """Return a part without histories after a failure; the next run repeats it."""
-    return _reject_all(job._replace(key=""), reason)._replace(failed=True)
-
-
-def _reject_all(job: RowsJob, reason: str) -> Part:
-    """Write a part of which no row has a history, for the same reason."""
-    names = dict.fromkeys(job.contacts["row_id"].to_pylist())
-    rejected = [Rejection("row", str(name), "", None, (reason,)) for name in names]
-    return _record(job, _columns(job.contacts), no_outcomes(job.contacts.num_rows), rejected)

@@ -10,7 +10,6 @@ from typing import Any
 from per_obspy.config import Run
 from per_obspy.config.engine import Engine, checked_address
 from per_obspy.errors import CatalogError, require_extra
-from per_obspy.resume import StatusError, read_status, write_status
 from per_obspy.runs.tasks.parallel import Workers
 
 
@@ -116,27 +115,7 @@ def opened_executor(engine: Engine, workers: Workers, folder: Path) -> Iterator[
         yield workers
 
 
-def engine_facts(executor: Executor | None) -> dict[str, Any]:
-    """Return workers and events of a cluster for ``run.json``; empty for other executors."""
+def engine_facts(executor: Executor | None) -> dict[str, Any] | None:
+    """Return workers and events of a cluster for ``run.json``; None for other executors."""
     facts = getattr(executor, "facts", None)
-    return {"engine": facts()} if facts else {}
-
-
-@contextmanager
-def noted_engine(record: Path, executor: Executor | None) -> Iterator[None]:
-    """Add workers and events of a cluster to ``run.json``, whether an error ends the run or not."""
-    try:
-        yield
-    finally:
-        if facts := engine_facts(executor):
-            _add(record, facts)
-
-
-def _add(record: Path, facts: dict[str, Any]) -> None:
-    """Add facts to the record of an unfinished run, if it can be read and written."""
-    try:
-        known = read_status(record)
-        others = {name: one for name, one in known.items() if name not in ("key", "outputs")}
-        write_status(record, known["key"], known["outputs"], {**others, **facts}, indent=1)
-    except (StatusError, OSError):
-        return  # the error that ended the run counts
+    return facts() if facts else None

@@ -1,6 +1,9 @@
 """
 Independent tasks on several processes or any executor; a failure does not stop other tasks.
 
+A resumable task leaves a status file (:mod:`per_obspy.resume`) of what it made: :func:`finish` is
+the one loop over stations, chunks of pairs and chunks of rows of buildings.
+
 The exception is a folder of results that cannot be written: the first ``WriteError`` or
 ``WrongOutput`` ends the work.
 
@@ -14,6 +17,7 @@ Few tasks are ahead of the results that were taken, so that a long row of them n
 
 import os
 import signal
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -28,8 +32,9 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
 from multiprocessing import active_children, parent_process
+from operator import attrgetter, methodcaller
 from threading import Lock, Thread
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError, WrongOutput
 from per_obspy.machine import machine_fault, machine_faults
@@ -65,6 +70,31 @@ class Work(NamedTuple, Generic[Task, Result]):
     do: Do[Task, Result]
     failed: Failed[Task, Result]
     name: Callable[[Task], str] = str
+
+
+class Resumable(ABC, Generic[Result]):
+    """Task whose result an earlier run may have left; other processes must be able to load it."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name of the task in messages."""
+
+    @abstractmethod
+    def with_key(self) -> Self:
+        """Return the task with the hash of everything on which its result depends."""
+
+    @abstractmethod
+    def earlier(self) -> Result | None:
+        """Return the result of an earlier run; None if the task has to be done."""
+
+    @abstractmethod
+    def do(self) -> Result:
+        """Do the work, write what it makes and its status, and return the result."""
+
+    @abstractmethod
+    def failed(self, reason: str) -> Result:
+        """Return the substitute for the result if the data are at fault."""
 
 
 @dataclass(frozen=True)
@@ -182,41 +212,56 @@ def prepare_workers(workers: int) -> None:
             start_server()
 
 
-def new_and_resumed(
-    tasks: Iterable[Task],
-    earlier: Callable[[Task], Result | None],
-    work: Work[Task, Result],
-    workers: Workers,
-) -> Iterator[Result]:
+def finish(tasks: Iterable[Resumable[Result]], workers: Workers) -> Iterator[Result]:
     """
-    Yield the result of every task; results of an earlier run are reused.
+    Yield the result of every resumable task; results of an earlier run are reused.
 
     Parameters
     ----------
-    tasks : iterable
-        Taken while the work goes on.
-    earlier : callable
-        Returns the result that an earlier run left of a task, None if there is none.
-    work, workers
-        As of :func:`results`, whose errors are raised.
-    """
-    resumed = list[Result]()
+    tasks : iterable of Resumable
+        Tasks, which are taken while the work goes on.
+    workers : Workers
+        Where to work.
 
-    def missing() -> Iterator[Task]:
+    Raises
+    ------
+    WriteError, WrongOutput, Unfinished
+        As :func:`results` does.
+    """
+    resumed, faults = list[Result](), list[str]()
+    watched = _Watched(_RESUMABLE, faults)
+
+    def missing() -> Iterator[Resumable[Result]]:
         """Yield the tasks without an earlier result, and collect the earlier results."""
         for task in tasks:
-            found = earlier(task)
-            if found is None:
-                yield task
-            else:
-                resumed.append(found)
+            # A key that cannot be computed costs its own task only
+            for found in watched.result(task, partial(_begun, task)):
+                if isinstance(found, Resumable):
+                    yield found
+                else:
+                    resumed.append(found)
 
     # Resumed results are passed on as soon as the next one is finished
-    for result in results(missing(), work, workers):
+    for result in _all_results(missing(), watched, workers):
         yield from resumed
         resumed.clear()
         yield result
     yield from resumed
+    if faults:
+        raise Unfinished(*faults)
+
+
+def _begun(task: Resumable[Result]) -> Resumable[Result] | Result:
+    """Return the result that an earlier run left of a task, or else the task with its key."""
+    keyed = task.with_key()
+    earlier = keyed.earlier()
+    return keyed if earlier is None else earlier
+
+
+#: Work of resumable tasks; only its first function travels to other processes.
+_RESUMABLE: Work[Any, Any] = Work(
+    methodcaller("do"), lambda task, reason: task.failed(reason), attrgetter("name")
+)
 
 
 class _Watched(Generic[Task, Result]):

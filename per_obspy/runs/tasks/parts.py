@@ -6,39 +6,18 @@ the rejections. A task whose status and part are whole is not done again.
 """
 
 import hashlib
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Self
 
 import pyarrow as pa
 
 from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
 from per_obspy.resume import earlier_status, read_status, write_status
-from per_obspy.runs.tasks.parallel import Work, Workers, new_and_resumed
-
-
-class PartJob(Protocol):
-    """Task that makes one part."""
-
-    @property
-    def number(self) -> int:
-        """Place of the part among all of them."""
-
-    @property
-    def rows(self) -> int:
-        """Number of rows that it takes."""
-
-    @property
-    def part(self) -> Path:
-        """Parquet file that it makes."""
-
-    @property
-    def key(self) -> str:
-        """Hash of everything on which the part depends."""
-
-
-Job = TypeVar("Job", bound=PartJob)
+from per_obspy.runs.tasks.parallel import Resumable
 
 
 class Part(NamedTuple):
@@ -69,54 +48,60 @@ class Part(NamedTuple):
     failed: bool = False
 
 
-def do_parts(jobs: Iterable[Job], work: Work[Job, Part], workers: Workers) -> Iterator[Part]:
+@dataclass(frozen=True, kw_only=True)
+class PartTask(Resumable[Part]):
     """
-    Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
+    Task that makes one part.
 
-    Parameters
+    Attributes
     ----------
-    jobs : iterable of PartJob
-        Tasks with their keys, which are taken while the work goes on.
-    work : Work
-        What a task does.
-    workers : Workers
-        Where to work.
-
-    Raises
-    ------
-    WriteError
-        If a part cannot be written.
-    Unfinished
-        After all other tasks, if the machine failed at some.
+    number : int
+        Place of the part among all of them.
+    part : Path
+        Parquet file that it makes.
+    key : str
+        Hash of everything on which the part depends; empty until it is computed.
     """
-    yield from new_and_resumed(jobs, _earlier_part, work, workers)
 
+    number: int
+    part: Path
+    key: str = ""
 
-def record_part(job: PartJob, rejected: Sequence[Rejection], key: str | None = None) -> Part:
-    """Write the status of a part, after the part if there is one, and return the part."""
-    has_part = job.part.is_file()
-    outputs = {job.part.name: file_hash(job.part)} if has_part else {}
-    key = job.key if key is None else key
-    write_status(_status_file(job), key, outputs, {"rejected": list(rejected)})
-    return _part(job, has_part)
+    @property
+    @abstractmethod
+    def rows(self) -> int:
+        """Number of rows that it takes."""
 
+    @abstractmethod
+    def content_hash(self) -> str:
+        """Return the hash of everything on which the part depends."""
 
-def _earlier_part(job: PartJob) -> Part | None:
-    """Return the part of an earlier run if its key is the same and the part is complete."""
-    status = earlier_status(_status_file(job), job.key)
-    if status is None or "rejected" not in status:
-        return None
-    return _part(job, bool(status["outputs"]))._replace(resumed=True)
+    def with_key(self) -> Self:
+        """Return the task with its key."""
+        return replace(self, key=self.content_hash())
 
+    def earlier(self) -> Part | None:
+        """Return the part of an earlier run if its key is the same and the part is complete."""
+        status = earlier_status(self._status, self.key)
+        if status is None or "rejected" not in status:
+            return None
+        return self._finished(bool(status["outputs"]))._replace(resumed=True)
 
-def _part(job: PartJob, has_part: bool) -> Part:
-    """Return the part of a task."""
-    return Part(job.number, job.rows, job.part if has_part else None, _status_file(job))
+    def record(self, rejected: Sequence[Rejection]) -> Part:
+        """Write the status of the part, after the part if there is one, and return the part."""
+        has_part = self.part.is_file()
+        outputs = {self.part.name: file_hash(self.part)} if has_part else {}
+        write_status(self._status, self.key, outputs, {"rejected": list(rejected)})
+        return self._finished(has_part)
 
+    @property
+    def _status(self) -> Path:
+        """Status file of the part."""
+        return self.part.with_suffix(".json")
 
-def _status_file(job: PartJob) -> Path:
-    """Return the status file of a part."""
-    return job.part.with_suffix(".json")
+    def _finished(self, has_part: bool) -> Part:
+        """Return the part of this task."""
+        return Part(self.number, self.rows, self.part if has_part else None, self._status)
 
 
 def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:

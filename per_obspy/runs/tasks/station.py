@@ -7,7 +7,8 @@ complete is not done again; one that another earthquake leaves as it is gets the
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -28,7 +29,7 @@ from per_obspy.records.earthquakes.quakeml import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
 from per_obspy.resume import Status, StatusError, changed_outputs, read_status, write_status
-from per_obspy.runs.tasks.parallel import Work, Workers, results
+from per_obspy.runs.tasks.parallel import Resumable
 from per_obspy.spectra.station import station_spectra
 from per_obspy.spectra.storage import read_spectra, without_motion, write_spectra
 
@@ -139,59 +140,18 @@ class Products(NamedTuple):
     facts: Mapping[str, object] = MappingProxyType({})
 
 
-def spectra_shard(job: "StationJob", stream: "Stream", source: "Source | None") -> Products:
+def spectra_shard(task: "StationTask", stream: "Stream", source: "Source | None") -> Products:
     """Write the spectra of a station as its station file if any record is usable."""
-    clean, unfit = process_station(taken(stream), job.processing, source)
+    clean, unfit = process_station(taken(stream), task.processing, source)
     if not clean:
         return Products(unfit)
     # Spectra at periods in equal steps of their logarithm
-    grid = job.spectra
+    grid = task.spectra
     periods = np.geomspace(grid.shortest, grid.longest, grid.count)
     dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
-    dataset.attrs |= hypocentre_attributes(job.event)
-    write_spectra(dataset, job.shard)
-    return Products(unfit, (job.shard,))
-
-
-class StationJob(NamedTuple):
-    """
-    One station to do.
-
-    Attributes
-    ----------
-    station : str
-        ``NETWORK.STATION``.
-    source : tuple of Path
-        Its waveform files.
-    inventory : Inventory or None
-        Its metadata.
-    event : EventFile or None
-        The earthquake.
-    processing, spectra : Processing, Spectra
-        Settings.
-    shard : Path
-        Where its Dataset goes.
-    hashes : tuple of str
-        Of the waveform files.
-    reader : partial
-        How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
-    product : callable
-        Function that makes the files from the records: see :func:`spectra_shard`.
-    key : str
-        Hash of all inputs of the station file but the earthquake; :func:`do_stations` computes it.
-    """
-
-    station: str
-    source: tuple[Path, ...]
-    inventory: "Inventory | None"
-    event: EventFile | None
-    processing: Processing
-    spectra: Spectra
-    shard: Path
-    hashes: tuple[str, ...] = ()
-    reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
-    product: "Callable[[StationJob, Stream, Source | None], Products]" = spectra_shard
-    key: str = ""
+    dataset.attrs |= hypocentre_attributes(task.event)
+    write_spectra(dataset, task.shard)
+    return Products(unfit, (task.shard,))
 
 
 class FinishedStation(NamedTuple):
@@ -225,112 +185,146 @@ class FinishedStation(NamedTuple):
     failed: bool = False
 
 
-def do_stations(jobs: Sequence[StationJob], workers: Workers) -> Iterator[FinishedStation]:
-    """
-    Yield every station as it is finished, in parallel; finished parts of an earlier run are reused.
+#: Reader of plain files.
+READ = partial(read_station)
 
-    Parameters
+
+@dataclass(frozen=True, kw_only=True)
+class StationTask(Resumable[FinishedStation]):
+    """
+    One station, from its records to its station file.
+
+    Attributes
     ----------
-    jobs : sequence of StationJob
-        One job per station.
-    workers : Workers
-        Where to work.
-
-    Raises
-    ------
-    WriteError, WrongOutput
-        If a station file cannot be written.
-    Unfinished
-        After all other stations, if the machine failed at some.
+    station : str
+        ``NETWORK.STATION``.
+    source : tuple of Path
+        Its waveform files.
+    inventory : Inventory or None
+        Its metadata.
+    event : EventFile or None
+        The earthquake.
+    processing, spectra : Processing, Spectra
+        Settings.
+    shard : Path
+        Where its Dataset goes.
+    hashes : tuple of str
+        Of the waveform files.
+    reader : partial
+        How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
+    product : callable
+        Function that makes the files from the records: see :func:`spectra_shard`.
+    key : str
+        Hash of all inputs of the station file but the earthquake; empty until it is computed.
     """
-    missing = list[StationJob]()
-    # A key that cannot be computed costs its own station only
-    for job in results(jobs, Work(_prepared, _failed, _name), Workers(1)):
-        if isinstance(job, FinishedStation):
-            yield job
-            continue
-        earlier = _earlier(job)
-        if earlier is None:
-            missing.append(job)
-        else:
-            yield earlier
-    yield from results(missing, Work(do_station, _failed, _name), workers)
+
+    station: str
+    source: tuple[Path, ...]
+    inventory: "Inventory | None"
+    event: EventFile | None
+    processing: Processing
+    spectra: Spectra
+    shard: Path
+    hashes: tuple[str, ...] = ()
+    reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = READ
+    product: "Callable[[StationTask, Stream, Source | None], Products]" = spectra_shard
+    key: str = ""
+
+    @property
+    def name(self) -> str:
+        """Network and station."""
+        return f"station {self.station}"
+
+    @property
+    def status(self) -> Path:
+        """Status file of the station."""
+        return self.shard.with_suffix(".json")
+
+    def with_key(self) -> "StationTask":
+        """Return the task with its key, and with an event that can be sent to other processes."""
+        return replace(self, key=_key(self), event=self.event and portable(self.event))
+
+    def earlier(self) -> FinishedStation | None:
+        """Return the station of an earlier run if its inputs are the same and its files whole."""
+        status = _known_status(self)
+        if status is None or status.get("source") != source_facts(self.event):
+            return None
+        return _whole_station(self.station, self.shard, status)
+
+    def do(self) -> FinishedStation:
+        """Write the station file and its status file, and return the finished station."""
+        if known := _unchanged_by_event(self):
+            return known
+        # Whatever an earlier run has left is of other inputs
+        remove_file(self.shard)
+        decisions = list[dict[str, Any]]()
+        products = _products(self, decisions)
+        has_shard = self.shard in products.files
+        digest, spectra = _read_shard(self.shard) if has_shard else ("", None)
+        # The status comes last: it is valid for whole files only
+        others = [file for file in products.files if file != self.shard]
+        outputs = {_from_status(self.shard, file): file_hash(file) for file in others}
+        outputs |= {self.shard.name: digest} if has_shard else {}
+        facts = {"shard": digest or None, "rejected": products.rejected, **products.facts}
+        facts |= {"source": source_facts(self.event), "decisions": decisions}
+        write_status(self.status, self.key, outputs, facts)
+        shard = self.shard if has_shard else None
+        return FinishedStation(self.station, shard, products.rejected, False, digest, spectra)
+
+    def failed(self, reason: str) -> FinishedStation:
+        """Return the station after a failure; the next run repeats it."""
+        rejection = Rejection("station", self.station, self.file_names, None, (reason,))
+        return FinishedStation(self.station, None, (rejection,), resumed=False, failed=True)
+
+    @property
+    def file_names(self) -> str:
+        """Names of the station's files, as rejections give them."""
+        return ", ".join(path.name for path in self.source)
 
 
-def _prepared(job: StationJob) -> StationJob | FinishedStation:
-    """Return a job with its key, and with an event that can be sent to other processes."""
-    event = job.event and portable(job.event)
-    return job._replace(key=_key(job), event=event)
-
-
-def do_station(job: StationJob) -> FinishedStation:
-    """Write a station file and its status file, and return the finished station."""
-    if known := _unchanged_by_event(job):
-        return known
-    # Whatever an earlier run has left is of other inputs
-    remove_file(job.shard)
-    decisions = list[dict[str, Any]]()
-    products = _products(job, decisions)
-    has_shard = job.shard in products.files
-    digest, spectra = _read_shard(job.shard) if has_shard else ("", None)
-    # The status comes last: it is valid for whole files only
-    others = [file for file in products.files if file != job.shard]
-    outputs = {_from_status(job.shard, file): file_hash(file) for file in others}
-    outputs |= {job.shard.name: digest} if has_shard else {}
-    facts = {"shard": digest or None, "rejected": products.rejected, **products.facts}
-    facts |= {"source": source_facts(job.event), "decisions": decisions}
-    write_status(_status_file(job.shard), job.key, outputs, facts)
-    shard = job.shard if has_shard else None
-    return FinishedStation(job.station, shard, products.rejected, False, digest, spectra)
-
-
-def _unchanged_by_event(job: StationJob) -> FinishedStation | None:
+def _unchanged_by_event(task: StationTask) -> FinishedStation | None:
     """
     Return the station of an earlier run for whose processing the earthquake is the same, else None.
 
     Its files get the facts of the earthquake now.
     """
-    status = _known_status(job)
-    if status is None or job.event is None:
+    status = _known_status(task)
+    if status is None or task.event is None:
         return None
-    rejected = _stored_rejections(status)
-    found = FinishedStation(job.station, job.shard, rejected, True)
-    if not is_of_event(status, job.event, job.processing) or not _whole_station(found, status):
+    is_same = is_of_event(status, task.event, task.processing)
+    if not is_same or _whole_station(task.station, task.shard, status) is None:
         return None
     # The hypocentre is part of a station file with spectra
     shard = status["shard"]
-    if shard and job.shard.suffix == SPECTRA:
-        if not moved_shard(job.shard, status["source"], job.event):
+    if shard and task.shard.suffix == SPECTRA:
+        if not moved_shard(task.shard, status["source"], task.event):
             return None
-        shard = file_hash(job.shard)
+        shard = file_hash(task.shard)
     # As if the station had been done with this earthquake at first
-    outputs = {**status["outputs"], **({job.shard.name: shard} if shard else {})}
+    outputs = {**status["outputs"], **({task.shard.name: shard} if shard else {})}
     rest = {name: fact for name, fact in status.items() if name not in ("key", "outputs")}
-    facts = {**rest, "shard": shard, "source": source_facts(job.event)}
-    status = write_status(_status_file(job.shard), job.key, outputs, facts)
-    return _whole_station(found, status)
+    facts = {**rest, "shard": shard, "source": source_facts(task.event)}
+    status = write_status(task.status, task.key, outputs, facts)
+    return _whole_station(task.station, task.shard, status)
 
 
-def _products(job: StationJob, decisions: list[dict[str, Any]]) -> Products:
+def _products(task: StationTask, decisions: list[dict[str, Any]]) -> Products:
     """Read the records of a station and make its products; an unusable station is a rejection."""
-    source = _file_names(job)
     try:
-        stream, unread = job.reader(job.source, job.inventory, job.station)
-        products = job.product(job, stream, source_of_job(job.event, decisions))
+        stream, unread = task.reader(task.source, task.inventory, task.station)
+        products = task.product(task, stream, source_of_job(task.event, decisions))
     except (TryLater, WrongOutput):
         raise  # no property of the station
     except PerError as error:
         raise_machine_fault(error)
         reasons = getattr(error, "reasons", None) or (str(error),)
-        return Products((Rejection("station", job.station, source, None, tuple(reasons)),))
+        rejection = Rejection("station", task.station, task.file_names, None, tuple(reasons))
+        return Products((rejection,))
     # Records that name no file came from all files of the station
-    unfit = [row if row.source else row._replace(source=source) for row in products.rejected]
+    unfit = [
+        row if row.source else row._replace(source=task.file_names) for row in products.rejected
+    ]
     return products._replace(rejected=(*unread, *unfit))
-
-
-def _file_names(job: StationJob) -> str:
-    """Return the names of a station's files, as rejections give them."""
-    return ", ".join(path.name for path in job.source)
 
 
 def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Dataset | None]:
@@ -344,59 +338,45 @@ def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Datas
     return digest, without_motion(read_spectra(shard, content))
 
 
-def _status_file(shard: Path) -> Path:
-    """Return the status file of a station file."""
-    return shard.with_suffix(".json")
-
-
 def _from_status(shard: Path, file: Path) -> str:
     """Return the path of an output relative to the folder of the status file."""
     return Path(os.path.relpath(file, shard.parent)).as_posix()
 
 
-def _key(job: StationJob) -> str:
+def _key(task: StationTask) -> str:
     """Return the hash of all inputs of the products of a station but the earthquake."""
-    settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
-    files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
-    files += ["with an earthquake"] if job.event else []
+    settings = [task.processing.model_dump_json(), task.spectra.model_dump_json()]
+    files = [f"{path.name} {digest}" for path, digest in zip(task.source, task.hashes, strict=True)]
+    files += ["with an earthquake"] if task.event else []
     # Reader and product are known by name, so that other processes find the same
-    steps = [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
-    metadata = [metadata_text(job.inventory)] if job.inventory else []
+    steps = [task.reader.func.__name__, task.reader.keywords, task.product.__name__]
+    metadata = [metadata_text(task.inventory)] if task.inventory else []
     parts = [version("per_obspy"), *settings, *files, *steps, *metadata]
     return bytes_hash("\n".join(map(str, parts)).encode())
 
 
-def _earlier(job: StationJob) -> FinishedStation | None:
-    """Return the station of an earlier run if all its inputs are the same and its files whole."""
-    status = _known_status(job)
-    if status is None or status.get("source") != source_facts(job.event):
-        return None
-    rejected = _stored_rejections(status)
-    return _whole_station(FinishedStation(job.station, job.shard, rejected, True), status)
-
-
-def _known_status(job: StationJob) -> Status | None:
+def _known_status(task: StationTask) -> Status | None:
     """Return the status of a station if its key is the same; None if it is not or is damaged."""
     try:
-        status = read_status(_status_file(job.shard))
+        status = read_status(task.status)
         _stored_rejections(status)
     except StatusError:
         return None
-    return status if status["key"] == job.key else None
+    return status if status["key"] == task.key else None
 
 
-def _whole_station(station: FinishedStation, status: Status) -> FinishedStation | None:
+def _whole_station(name: str, shard: Path, status: Status) -> FinishedStation | None:
     """Return a resumed station with hash and spectra of its file; None if an output has changed."""
-    assert station.shard is not None  # where it would be
+    station = FinishedStation(name, shard, _stored_rejections(status), True)
     outputs = dict(status["outputs"])
-    known = outputs.pop(station.shard.name, "")
-    if changed_outputs(_status_file(station.shard), {**status, "outputs": outputs}):
+    known = outputs.pop(shard.name, "")
+    if changed_outputs(shard.with_suffix(".json"), {**status, "outputs": outputs}):
         return None
     if not known:
         return station._replace(shard=None)
     # The station file is opened once: for its hash, and for its spectra if it has not changed
     try:
-        digest, spectra = _read_shard(station.shard, known)
+        digest, spectra = _read_shard(shard, known)
     except OSError:
         return None
     return station._replace(hash=digest, spectra=spectra) if digest == known else None
@@ -424,24 +404,12 @@ def earlier_station(status_file: Path) -> FinishedStation:
     CatalogError
         If the status file cannot be read, or the station file has changed.
     """
+    shard = status_file.with_suffix(SPECTRA)
     try:
         status = read_status(status_file)
-        rejected = _stored_rejections(status)
+        station = _whole_station(status_file.stem, shard, status)
     except StatusError as error:
         raise CatalogError(str(status_file), f"not the note of a station: {error}") from error
-    shard = status_file.with_suffix(SPECTRA)
-    station = _whole_station(FinishedStation(status_file.stem, shard, rejected, True), status)
     if station is None:
         raise CatalogError(str(shard), "damaged: changed since the run wrote it")
     return station
-
-
-def _name(job: StationJob) -> str:
-    """Return the name of a station in messages."""
-    return f"station {job.station}"
-
-
-def _failed(job: StationJob, reason: str) -> FinishedStation:
-    """Return a station after a failure; the next run repeats it."""
-    rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
-    return FinishedStation(job.station, None, (rejection,), resumed=False, failed=True)

@@ -9,9 +9,9 @@ from per_obspy.config import Building, Interpolation, Screening
 from per_obspy.errors import Unfinished
 from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.runs.tasks import chunk
-from per_obspy.runs.tasks.chunk import ChunkJob, do_chunks
+from per_obspy.runs.tasks.chunk import ChunkTask
 from per_obspy.runs.tasks.ground_files import ground_files
-from per_obspy.runs.tasks.parallel import Workers
+from per_obspy.runs.tasks.parallel import Workers, finish
 from per_obspy.runs.tasks.parts import rejections
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
@@ -29,7 +29,9 @@ def make_jobs(tmp_path):
         ground, _ = ground_files([], (), Interpolation())
         common = {"ground": ground, "building": Building(), "screening": Screening()} | changes
         return [
-            ChunkJob(number, rows, part=tmp_path / "chunks" / f"{number}.parquet", **common)
+            ChunkTask(
+                number=number, chunk=rows, part=tmp_path / "chunks" / f"{number}.parquet", **common
+            )
             for number, rows in enumerate(inventory.chunks(3))
         ]
 
@@ -37,7 +39,7 @@ def make_jobs(tmp_path):
 
 
 def done(jobs):
-    return sorted(do_chunks(jobs, Workers(1)), key=lambda part: part.number)
+    return sorted(finish(jobs, Workers(1)), key=lambda part: part.number)
 
 
 def reasons(parts):
@@ -104,7 +106,7 @@ def _is_broken(_):
 
 def test_a_chunk_whose_work_failed_is_done_by_the_next_run(make_jobs, monkeypatch):
     # each row has the reason, and the status is not valid
-    monkeypatch.setattr(chunk, "do_chunk", _is_broken)
+    monkeypatch.setattr(ChunkTask, "do", _is_broken)
     found = reasons(done(make_jobs()))
     assert set(found.values()) == {("RuntimeError: no luck",)}
     assert len(found) == 7
@@ -120,14 +122,14 @@ MACHINE = [MemoryError("no more"), OSError(errno.EIO, "Input/output error", "S1.
 @pytest.mark.parametrize("error", MACHINE)
 def test_a_chunk_at_which_the_machine_failed_has_no_result(make_jobs, monkeypatch, error):
     # would catch 100 000 pairs that are rejected because memory was short
-    computed = chunk.do_chunk
+    computed = ChunkTask.do
 
     def fails_for_one(job):
         if job.number == 1:
             raise error
         return computed(job)
 
-    monkeypatch.setattr(chunk, "do_chunk", fails_for_one)
+    monkeypatch.setattr(ChunkTask, "do", fails_for_one)
     with pytest.raises(Unfinished, match=r"pairs.csv, lines 5 to 7: ") as unfinished:
         done(make_jobs())
     assert len(unfinished.value.faults) == 1

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -12,9 +13,8 @@ from per_obspy.errors import CatalogError, Unfinished, WrongOutput
 from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.folder import read_station
 from per_obspy.records.sources import find_path_sources
-from per_obspy.runs.tasks import station as jobs
-from per_obspy.runs.tasks.parallel import DIED, Workers
-from per_obspy.runs.tasks.station import StationJob, do_stations, earlier_station
+from per_obspy.runs.tasks.parallel import DIED, Workers, finish
+from per_obspy.runs.tasks.station import StationTask, earlier_station
 from per_obspy.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.storage import read_spectra
 
@@ -38,7 +38,7 @@ def make_jobs(records, tmp_path):
         found = find_path_sources([records])
         common = {"processing": Processing(), "spectra": GRID} | changes
         return [
-            StationJob(
+            StationTask(
                 station=name,
                 source=source.files,
                 inventory=source.inventory,
@@ -54,7 +54,7 @@ def make_jobs(records, tmp_path):
 
 
 def done(jobs, workers=1):
-    return sorted(do_stations(jobs, Workers(workers)), key=lambda station: station.station)
+    return sorted(finish(jobs, Workers(workers)), key=lambda station: station.station)
 
 
 def test_a_finished_station_carries_its_spectra_and_the_hash_of_its_shard(make_jobs):
@@ -92,7 +92,7 @@ def test_whatever_changes_a_shard_changes_its_key(make_jobs, change):
 def test_a_changed_file_is_read_again(make_jobs):
     first, second = make_jobs()
     done([first, second])
-    again = done([first._replace(hashes=("another",) * len(first.hashes)), second])
+    again = done([replace(first, hashes=("another",) * len(first.hashes)), second])
     assert [station.resumed for station in again] == [False, True]
 
 
@@ -131,9 +131,9 @@ def test_an_earlier_station_is_found_by_its_status(make_jobs):
 
 
 def test_finished_stations_travel_to_other_processes(make_jobs):
-    first = {station.station: station for station in do_stations(make_jobs(), Workers(2))}
+    first = {station.station: station for station in finish(make_jobs(), Workers(2))}
     # the same job in this process
-    for station in done([job._replace(shard=job.shard.with_stem("a")) for job in make_jobs()]):
+    for station in done([replace(job, shard=job.shard.with_stem("a")) for job in make_jobs()]):
         xr.testing.assert_identical(first[station.station].spectra, station.spectra)
         again = pickle.loads(pickle.dumps(station))
         xr.testing.assert_identical(again.spectra, station.spectra)
@@ -141,9 +141,9 @@ def test_finished_stations_travel_to_other_processes(make_jobs):
 
 def empty_job(station, folder, **changes):
     """Return a job without files."""
-    common = {"processing": Processing(), "spectra": Spectra()}
-    shard = folder / f"{station}.nc"
-    return StationJob(station, (), None, None, shard=shard, **common)._replace(**changes)
+    nothing = {"source": (), "inventory": None, "event": None, "shard": folder / f"{station}.nc"}
+    settings = {"processing": Processing(), "spectra": Spectra()}
+    return StationTask(station=station, **nothing | settings | changes)
 
 
 class Poison:
@@ -155,10 +155,10 @@ class Poison:
 
 def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
     batch = [empty_job(f"XX.S{number}", tmp_path) for number in range(4)]
-    batch[2] = batch[2]._replace(reader=partial(read_station, Poison()))
+    batch[2] = replace(batch[2], reader=partial(read_station, Poison()))
     stations = list[str]()
     with pytest.raises(Unfinished) as unfinished:
-        stations.extend(station.station for station in do_stations(batch, Workers(2)))
+        stations.extend(station.station for station in finish(batch, Workers(2)))
     # the guilty one has no result that a later run could take for one
     assert unfinished.value.faults == (f"station XX.S2: {DIED}",)
     assert sorted(stations) == ["XX.S0", "XX.S1", "XX.S3"]
@@ -170,8 +170,8 @@ def _raises(job):
 
 
 def test_whatever_a_worker_raises_becomes_a_reason(monkeypatch, tmp_path):
-    monkeypatch.setattr(jobs, "do_station", _raises)
-    (station,) = do_stations([empty_job("XX.S1", tmp_path)], Workers(2))
+    monkeypatch.setattr(StationTask, "do", _raises)
+    (station,) = finish([empty_job("XX.S1", tmp_path)], Workers(2))
     assert station.rejected[0].reasons == ("RuntimeError: no luck with XX.S1",)
 
 
@@ -207,5 +207,5 @@ def test_a_folder_of_stations_that_cannot_be_is_no_property_of_them(
     name = "XX.S001.nc" if len(folder) < 10 else f"{folder}.nc"
     place = tmp_path / folder / name if len(folder) < 10 else tmp_path / name
     with pytest.raises(WrongOutput, match=f"cannot be written: .*{reason}") as error:
-        done([job._replace(shard=place) for job in make_jobs()])
+        done([replace(job, shard=place) for job in make_jobs()])
     assert "\n" not in str(error.value)

@@ -8,8 +8,8 @@ from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.records.sources import find_path_sources
 from per_obspy.runs.tasks import station as jobs
-from per_obspy.runs.tasks.parallel import Workers
-from per_obspy.runs.tasks.station import StationJob, do_stations
+from per_obspy.runs.tasks.parallel import Workers, finish
+from per_obspy.runs.tasks.station import StationTask
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
 GRID = Spectra(count=5, dampings=(0.05,), azimuth_step=90)
@@ -28,7 +28,7 @@ def job_list(region, folder, event):
     found, _ = region
     common = {"event": event, "processing": Processing(), "spectra": GRID}
     return [
-        StationJob(
+        StationTask(
             station=name,
             source=source.files,
             inventory=source.inventory,
@@ -62,7 +62,7 @@ ORIGIN = {"latitude": 0.03, "depth": 9_000.0}
 def finished(region, tmp_path_factory):
     """A folder with stations of the first facts."""
     folder = tmp_path_factory.mktemp("stations")
-    list(do_stations(job_list(region, folder, updated(region)), Workers(1)))
+    list(finish(job_list(region, folder, updated(region)), Workers(1)))
     return folder
 
 
@@ -77,11 +77,11 @@ def test_an_update_processes_no_station_and_leaves_the_files_of_a_fresh_run(
     kept.mkdir()
     for name, text in content(finished).items():
         (kept / name).write_bytes(text)
-    list(do_stations(job_list(region, fresh, updated(region, **changes)), Workers(1)))
+    list(finish(job_list(region, fresh, updated(region, **changes)), Workers(1)))
     # Neither its records are read nor are they processed
     with monkeypatch.context() as patch:
         patch.setattr(jobs, "_products", lambda *_: 1 / 0)
-        done = list(do_stations(job_list(region, kept, updated(region, **changes)), Workers(1)))
+        done = list(finish(job_list(region, kept, updated(region, **changes)), Workers(1)))
     assert [station.resumed for station in done] == [True, True]
     assert content(kept) == content(fresh)
     if "latitude" in changes:
@@ -97,7 +97,7 @@ def test_an_update_that_moves_the_first_wave_processes_again(region, finished, t
     for name, text in content(finished).items():
         (tmp_path / name).write_bytes(text)
     time = region[1].origins[0].time - 25.0
-    done = list(do_stations(job_list(region, tmp_path, updated(region, time=time)), Workers(1)))
+    done = list(finish(job_list(region, tmp_path, updated(region, time=time)), Workers(1)))
     assert [station.resumed for station in done] == [False, False]
 
 
@@ -107,6 +107,6 @@ def test_an_unknown_hypocentre_processes_again(region, finished, tmp_path, chang
     for name, text in content(finished).items():
         (tmp_path / name).write_bytes(text)
     event = None if changes is None else updated(region, **changes)
-    done = list(do_stations(job_list(region, tmp_path, event), Workers(1)))
+    done = list(finish(job_list(region, tmp_path, event), Workers(1)))
     assert [station.resumed for station in done] == [False, False]
     assert all("hypocentre_depth" not in station.spectra.attrs for station in done)

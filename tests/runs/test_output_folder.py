@@ -8,7 +8,7 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.resume import earlier_status
-from per_obspy.runs.tasks.output_folder import (
+from per_obspy.runs.output_folder import (
     file_hashes,
     locked_folder,
     recorded,
@@ -18,7 +18,7 @@ from per_obspy.runs.tasks.output_folder import (
 TRIES = """
 import sys
 from pathlib import Path
-from per_obspy.runs.tasks.output_folder import locked_folder
+from per_obspy.runs.output_folder import locked_folder
 with locked_folder(Path(sys.argv[1])):
     print("locked")
 """

@@ -1,10 +1,4 @@
-"""
-Descriptions by ``per-obspy info`` of every kind of input and result.
-
-Covers ``per_obspy.runs.inputs.described_tables``,
-``per_obspy.runs.inputs.described_motion``, ``per_obspy.runs.inputs.described_runs`` and
-``per_obspy.runs.inputs.facts``.
-"""
+"""Descriptions by ``per-obspy info`` of every kind of input and result."""
 
 import json
 
@@ -13,8 +7,7 @@ import pytest
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
-from per_obspy.runs.inputs.described_inputs import described
-from per_obspy.runs.inputs.described_tables import MOST_ROWS
+from per_obspy.runs.inputs.description import MOST_ROWS, describe
 from per_obspy.simulation.earthquake import simulate, write_simulation
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap,ward\n"
@@ -37,7 +30,7 @@ SHAKEMAP = """<?xml version="1.0"?>
 
 
 def _facts(path):
-    found = described(str(path))
+    found = describe(str(path))
     json.dumps(found.values)
     return found, dict(found.lines)
 
@@ -143,7 +136,7 @@ def test_configurations(tmp_path):
     assert _facts(tmp_path / "s.toml")[1]["stations"] == "3"
     (tmp_path / "wrong.toml").write_text("name = 1\n")
     with pytest.raises(CatalogError, match=r"wrong\.toml: "):
-        described(str(tmp_path / "wrong.toml"))
+        describe(str(tmp_path / "wrong.toml"))
 
 
 def test_an_identifier_is_not_looked_up():
@@ -154,7 +147,7 @@ def test_an_identifier_is_not_looked_up():
 def test_damaged_results_are_one_line(tmp_path):
     (tmp_path / "run.json").write_text("{")
     with pytest.raises(CatalogError, match=r"run\.json: cannot be read"):
-        described(str(tmp_path))
+        describe(str(tmp_path))
     (tmp_path / "spectra.nc").write_bytes(b"CDF\x01" + bytes(100))
     with pytest.raises(CatalogError, match="holds no spectra of stations"):
-        described(str(tmp_path / "spectra.nc"))
+        describe(str(tmp_path / "spectra.nc"))

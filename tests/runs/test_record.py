@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from per_obspy.runs.results.served_stations import (
+from per_obspy.runs.record import (
     KnownStations,
     Served,
     earlier_facts,
