@@ -202,24 +202,11 @@ class Processing(Section):
     overlap: float = Field(
         0.8, gt=0, le=1, description="share of the longer horizontal component that both must cover"
     )
-    onset_margin: float = Field(
-        0.5, ge=0, description="time between the end of the noise and the first wave, s"
-    )
-    shortest_noise: float = Field(
-        2.0,
-        gt=0,
-        description="shortest noise window that is used, s; shorter ones count as missing",
-    )
     longest_noise: float = Field(
         120.0, gt=0, description="longest time before the first wave that is kept, s"
     )
     longest_signal: float = Field(
         600.0, gt=0, description="longest time after the first wave that is kept, s"
-    )
-    pick_tolerance: float = Field(
-        10.0,
-        gt=0,
-        description="largest difference between a pick and the computed travel time of P, s",
     )
     smoothing: float = Field(20.0, gt=0, description="bandwidth b of the Konno-Ohmachi window")
     required_band: tuple[float, float] = Field(

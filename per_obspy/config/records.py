@@ -179,14 +179,6 @@ class Fdsn(Window):
     timeout: float = Field(
         60.0, gt=0, description="longest time without an answer, or without more of it, s"
     )
-    longest_answer: float = Field(
-        600.0, gt=0, description="longest duration of one answer, s; slower answers are given up"
-    )
-    largest_answer: int = Field(
-        256 * 2**20,
-        gt=0,
-        description="largest size of an answer after unpacking, bytes; larger answers are given up",
-    )
     retries: int = Field(
         5,
         ge=0,
@@ -204,14 +196,6 @@ class Fdsn(Window):
     )
     connections: int = Field(
         3, ge=1, le=16, description="number of stations requested at the same time"
-    )
-    longest_pause: float | None = Field(
-        None,
-        ge=0,
-        description=(
-            "longest pause that a service may demand by Retry-After, s; a service that demands "
-            "more is not asked again in this run; if not set, it is asked again after at most 600 s"
-        ),
     )
 
     @property

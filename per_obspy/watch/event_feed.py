@@ -38,6 +38,9 @@ OVERLAP = 600.0
 #: move an origin by less than a minute, aftershocks that are listed come minutes later).
 OTHER_EVENT = 600.0
 
+#: Largest number of earthquakes in one request.
+MOST_EVENTS = 20_000
+
 #: Suffixes of QuakeML files.
 SUFFIXES = (".xml", ".quakeml")
 
@@ -113,7 +116,7 @@ def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
     query = {
         "starttime": f"{start:%Y-%m-%dT%H:%M:%S}",
         "orderby": "time",
-        "limit": f"{watch.most_events}",
+        "limit": f"{MOST_EVENTS}",
     }
     # A circle of the whole Earth excludes no event
     if circle.radius < 180.0:
@@ -150,13 +153,13 @@ def _listed(
     """Return the listed earthquakes; beyond the limit of a list also all strong enough ones."""
     service = watch.service or ""
     rows, problems = listed_events(pool, service, query)
-    if len(rows) < watch.most_events:
+    if len(rows) < MOST_EVENTS:
         return rows, problems
     # Weak ones must not crowd out strong ones
     smallest = min(reach.magnitude for reach in watch.magnitudes)
     log.warning(
         "%s: lists %d earthquakes or more: asked again from magnitude %g",
-        *(public_url(service), watch.most_events, smallest),
+        *(public_url(service), MOST_EVENTS, smallest),
     )
     strong, others = listed_events(pool, service, {**query, "minmagnitude": f"{smallest:g}"})
     return [*rows, *strong], [*problems, *others]

@@ -19,7 +19,7 @@ from per_obspy.watch.state import EventState, moment
 STEP = 10.0
 
 #: Retries of a request for records; what still fails is asked for by the next run.
-RETRIES, LONGEST_PAUSE = 2, 5.0
+RETRIES = 2
 
 #: Age from which a record file of a watched folder counts as finished, s.
 SETTLE = 10.0
@@ -155,10 +155,8 @@ def _rounded(state: EventState) -> datetime:
 
 def _placed_fdsn(fdsn: Fdsn, folder: Path, origin: datetime, ends: float) -> Fdsn:
     """Return the request for the records of an earthquake."""
-    pause = LONGEST_PAUSE if fdsn.longest_pause is None else fdsn.longest_pause
-    patience = {"retries": min(fdsn.retries, RETRIES), "longest_pause": pause}
-    place = {"cache": folder / "records"}
-    return fdsn.model_copy(update={**place, **patience, **_window(fdsn, origin, ends)})
+    changes = {"cache": folder / "records", "retries": min(fdsn.retries, RETRIES)}
+    return fdsn.model_copy(update={**changes, **_window(fdsn, origin, ends)})
 
 
 def _window(window: Window, origin: datetime, ends: float) -> dict[str, str]:

@@ -30,6 +30,9 @@ from per_obspy.watch.state import (
 
 log = logging.getLogger(__name__)
 
+#: Time after which an open earthquake is requested by its identifier, s.
+CONFIRM = 900.0
+
 
 def is_over(watcher: Watcher, state: WatchState) -> bool:
     """Return whether the time between two polls has passed, or the clock was put back."""
@@ -125,7 +128,7 @@ def confirm(watcher: Watcher, states: dict[str, EventState], errors: list[PerErr
     for state in list(states.values()):
         now = watcher.now()
         elapsed = (now - moment(state.confirmed)).total_seconds()
-        recent = 0.0 <= elapsed < watch.confirm
+        recent = 0.0 <= elapsed < CONFIRM
         if state.state != "open" or recent or is_paused(now, state.not_before):
             continue
         faults = list[PerError]()
