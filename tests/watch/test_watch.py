@@ -2,7 +2,7 @@
 
 Tests ``per_obspy.watch.watch``, ``per_obspy.watch.event_feed``,
 ``per_obspy.watch.event_run``, ``per_obspy.watch.state`` and
-``per_obspy.watch.open_events`` as well.
+``per_obspy.watch.polling`` as well.
 """
 
 import errno
