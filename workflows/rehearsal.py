@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve()
-ROOMS = ("operation", "records", "pipeline")
+ROOMS = ("watch", "records", "runs")
 sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ROOMS]
 
 from fdsn_server import FdsnServer, serving, status  # noqa: E402 - from the tests

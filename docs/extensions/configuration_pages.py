@@ -9,9 +9,8 @@ import tomlkit
 from pydantic.fields import FieldInfo
 from tables import code, table, write_page
 
-from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.pairs import Simulation
-from per_obspy.config.run import Design, Run
+from per_obspy.config.run import Design, Ensemble, Run
 from per_obspy.config.section import Section, sections_of
 
 #: Models of whole files: title and first lines of their part of the page.

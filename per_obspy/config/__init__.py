@@ -6,13 +6,10 @@ or one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.engine import Engine
-from per_obspy.config.ensemble import Ensemble, EnsembleScenario
-from per_obspy.config.operation.notify import Notify
-from per_obspy.config.operation.watch import Reach, Watch
 from per_obspy.config.pairs import Pairs, Rows, Scenario, SimulatedPairs, Simulation, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
-from per_obspy.config.run import Design, Run, screening_kind
+from per_obspy.config.run import Design, Ensemble, EnsembleScenario, Run, screening_kind
 from per_obspy.config.screening import (
     Building,
     Codes,
@@ -23,6 +20,7 @@ from per_obspy.config.screening import (
     in_language,
 )
 from per_obspy.config.section import RelativePath, Section, checked, load
+from per_obspy.config.watch import Notify, Reach, Watch
 
 __all__ = [
     "Archives",

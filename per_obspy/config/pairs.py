@@ -24,10 +24,6 @@ class Scenario(Section):
     latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
     longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
     depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
-    density: float = Field(2800.0, ge=1000, le=5000, description="kg/m3 at the source (Boore 2003)")
-    shear_velocity: float = Field(
-        3500.0, ge=100, le=6000, description="m/s at the source (Boore 2003)"
-    )
     quality: float = Field(180.0, gt=0, description="Q at 1 Hz (Raoof and others 1999)")
     quality_exponent: float = Field(
         0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)"
@@ -54,27 +50,13 @@ class Scenario(Section):
     lakebed_damping: float = Field(
         0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical"
     )
-    lakebed_scatter: float = Field(
-        0.1, ge=0, description="log-standard deviation of its frequency between stations"
-    )
     site_log_std: float = Field(
         0.7,
         ge=0,
         le=1.5,
         description="log-standard deviation of the Fourier spectrum between places",
     )
-    site_reach: float = Field(
-        25_000.0,
-        gt=0,
-        description="m, where its correlation between places has fallen to 0.05 (SA at 1 s: "
-        "Jayaram & Baker 2009)",
-    )
-    correlation: float = Field(
-        0.3, ge=-1, le=1, description="between the north and east components"
-    )
-    vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum")
     noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
-    pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
     dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")
 
     @field_validator("origin_time")

@@ -21,7 +21,10 @@ class Check(Section):
     threshold: float = Field(description="limit of the check, in its unit")
     level: str = Field(
         pattern="^(reject|warn|note)$",
-        description="reject: the trace is left out; warn or note: the finding is recorded",
+        description=(
+            "reject: the trace is left out; warn: somebody should look at the record, which is "
+            "flagged; note: bookkeeping, in the column notes of stations.csv alone"
+        ),
     )
 
 
@@ -71,7 +74,7 @@ class Checks(Section):
         "overflows of the counter, relative to the roughness before",
     )
     counter_use: Check = _check(
-        0.8, "warn", "largest peak relative to the full scale of a 24-bit counter"
+        0.8, "note", "largest peak relative to the full scale of a 24-bit counter"
     )
     dropout: Check = _check(
         0.5, "reject", "duration without a change during the shaking that means missing samples, s"
@@ -87,7 +90,10 @@ class Checks(Section):
     )
     zero_crossings: Check = _check(0.1, "reject", "smallest number of zero crossings per second")
     header_peak: Check = _check(
-        0.01, "warn", "largest relative difference between the peaks of header and samples"
+        0.1, "warn", "largest relative difference between the peaks of header and samples"
+    )
+    header_rounding: Check = _check(
+        0.01, "note", "the same difference, as rounding or another filter makes it"
     )
     outlier: Check = _check(
         5.0, "reject", "largest ratio of a peak to the largest peak of two other components"
@@ -202,24 +208,11 @@ class Processing(Section):
     overlap: float = Field(
         0.8, gt=0, le=1, description="share of the longer horizontal component that both must cover"
     )
-    onset_margin: float = Field(
-        0.5, ge=0, description="time between the end of the noise and the first wave, s"
-    )
-    shortest_noise: float = Field(
-        2.0,
-        gt=0,
-        description="shortest noise window that is used, s; shorter ones count as missing",
-    )
     longest_noise: float = Field(
         120.0, gt=0, description="longest time before the first wave that is kept, s"
     )
     longest_signal: float = Field(
         600.0, gt=0, description="longest time after the first wave that is kept, s"
-    )
-    pick_tolerance: float = Field(
-        10.0,
-        gt=0,
-        description="largest difference between a pick and the computed travel time of P, s",
     )
     smoothing: float = Field(20.0, gt=0, description="bandwidth b of the Konno-Ohmachi window")
     required_band: tuple[float, float] = Field(

@@ -20,6 +20,14 @@ Provider = Annotated[str, PlainSerializer(public_url)]
 SeedLinkServer = Annotated[str, Field(pattern=r"^(seedlink://)?[A-Za-z0-9.-]{1,253}(:\d{1,5})?/?$")]
 
 
+#: Station as NET.STA, and station or channel as NET.STA.LOC.CHA with wildcards.
+StationName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]*\.[A-Za-z0-9_-]+$")]
+StationOrChannel = Annotated[
+    str,
+    Field(pattern=r"^[A-Za-z0-9_-]*\.[A-Za-z0-9_-]+(\.[A-Za-z0-9_?*-]*\.[A-Za-z0-9_?*-]+)?$"),
+]
+
+
 class Columns(Section):
     """Form of a plain table of samples (``records/text_table.py``)."""
 
@@ -179,14 +187,6 @@ class Fdsn(Window):
     timeout: float = Field(
         60.0, gt=0, description="longest time without an answer, or without more of it, s"
     )
-    longest_answer: float = Field(
-        600.0, gt=0, description="longest duration of one answer, s; slower answers are given up"
-    )
-    largest_answer: int = Field(
-        256 * 2**20,
-        gt=0,
-        description="largest size of an answer after unpacking, bytes; larger answers are given up",
-    )
     retries: int = Field(
         5,
         ge=0,
@@ -204,14 +204,6 @@ class Fdsn(Window):
     )
     connections: int = Field(
         3, ge=1, le=16, description="number of stations requested at the same time"
-    )
-    longest_pause: float | None = Field(
-        None,
-        ge=0,
-        description=(
-            "longest pause that a service may demand by Retry-After, s; a service that demands "
-            "more is not asked again in this run; if not set, it is asked again after at most 600 s"
-        ),
     )
 
     @property
@@ -328,11 +320,18 @@ class Records(Section):
             "read"
         ),
     )
-    trust: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]*\.[A-Za-z0-9_-]+$")], ...] = Field(
+    without: tuple[StationOrChannel, ...] = Field(
         (),
         description=(
-            "stations (NET.STA) that serve their pairs although their peaks or places are "
-            "implausible next to the other stations; they keep their flags"
+            "stations (NET.STA) and channels (NET.STA.LOC.CHA; * and ? are wildcards) that are "
+            "left out; each is a row of rejected.csv"
+        ),
+    )
+    trust: tuple[StationName, ...] = Field(
+        (),
+        description=(
+            "stations (NET.STA) whose records are used although their peaks, places or "
+            "components are implausible; they keep their flags"
         ),
     )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")
@@ -354,6 +353,12 @@ class Records(Section):
     def _any_source(self) -> Self:
         if not any((self.folder, self.columns, self.fdsn, self.sds, self.asdf, self.shakemap)):
             raise ValueError("give at least one of folder, columns, fdsn, sds, asdf and shakemap")
+        return self
+
+    @model_validator(mode="after")
+    def _used_or_not(self) -> Self:
+        if both := sorted({*self.without} & {*self.trust}):
+            raise ValueError(f"{both[0]} is in both without and trust: give one of them")
         return self
 
     @model_validator(mode="after")

@@ -20,6 +20,10 @@ from per_obspy.errors import RecordRejected, Rejection
 
 Value = str | float | int
 
+#: Level of a check that would reject a record, if its station were not trusted, and the words that
+#: its reason gets.
+TRUSTED, USED_ANYWAY = "trusted", " (used: records.trust)"
+
 #: Reasons of recorders that reached a limit begin with this word: see :mod:`.chain`.
 CLIPPED = "clipped"
 
@@ -47,7 +51,9 @@ MOST = {
     "dropout": "dropout, s without change:",
     "filled": "filled: {} samples on a straight line during the shaking, s:",
     "spike": "spike or step, over its vicinity:",
-    "header_peak": "largest sample off the header's {:g} by a share of",
+    **dict.fromkeys(
+        ("header_peak", "header_rounding"), "largest sample off the header's {:g} by a share of"
+    ),
     "outlier": "peak over that of {}:",
     "weak_component": "peak of {} over {}:",
     "copied_component": "its samples are those of {}: correlation",
@@ -79,6 +85,7 @@ MILDER = {
     "saturation": "possible_saturation",
     "impossible_acceleration": "unusual_acceleration",
     "impossible_velocity": "unusual_velocity",
+    "header_peak": "header_rounding",
 }
 
 #: Flag -> the checks that raise it where they warn; others raise ``record_warning``.
@@ -235,13 +242,26 @@ class Findings(list[Finding]):
 
     def add(self, check: str, reason: str) -> None:
         """Add a failed check with a reason of its own."""
-        self.append(Finding(check, getattr(self.checks, check).level, reason))
+        level = getattr(self.checks, check).level
+        if level == TRUSTED:
+            level, reason = "warn", f"{reason}{USED_ANYWAY}"
+        self.append(Finding(check, level, reason))
 
 
 def lenient(checks: Checks, names: Iterable[str]) -> Checks:
     """Return checks of which some only warn."""
     warnings = {name: getattr(checks, name).model_copy(update={"level": "warn"}) for name in names}
     return checks.model_copy(update=warnings)
+
+
+def trusting(checks: Checks) -> Checks:
+    """Return checks of which those of plausibility warn, and say that the record is trusted."""
+    trusted = {
+        name: getattr(checks, name).model_copy(update={"level": TRUSTED})
+        for name in FLAGGED_CHECKS["implausible_record"]
+        if getattr(checks, name).level == "reject"
+    }
+    return checks.model_copy(update=trusted)
 
 
 def judge(trace: Trace, findings: Iterable[Finding]) -> Trace:

@@ -33,6 +33,9 @@ UNKNOWN_DEPTH = 10
 #: Digits after the point of a computed P time, s: its error is that of the origin and the model.
 P_DIGITS = 1
 
+#: Largest difference between a pick and the computed travel time of P, s.
+PICK_TOLERANCE = 10.0
+
 #: Traces whose picks are tried in turn.
 DIRECTIONS = ("vertical", "horizontal")
 
@@ -108,7 +111,6 @@ def _model() -> "TauPyModel":
 def first_wave(
     picked: Callable[[str], Sequence[UTCDateTime]],
     computed: UTCDateTime | None,
-    tolerance: float,
     end: UTCDateTime,
 ) -> tuple[UTCDateTime | None, str]:
     """
@@ -116,7 +118,7 @@ def first_wave(
 
     ``picked`` returns the picks of the traces of a direction, one of `DIRECTIONS`. The computed P
     wave is rounded, so that a negligible change of origin changes nothing; picks farther from it
-    than the tolerance, s, do not count. A P wave after the end of the record contradicts every
+    than `PICK_TOLERANCE` do not count. A P wave after the end of the record contradicts every
     pick: the station is in a wrong place, or its clock is wrong, and the picks count.
     """
     if computed is not None:
@@ -125,7 +127,7 @@ def first_wave(
     for direction in DIRECTIONS:
         times = picked(direction)
         if computed is not None and computed <= end:
-            times = [time for time in times if abs(time - computed) <= tolerance]
+            times = [time for time in times if abs(time - computed) <= PICK_TOLERANCE]
         if times:
             middle = median(time.timestamp for time in times)
             return UTCDateTime(middle), f"median of {len(times)} picked {direction}"
@@ -186,5 +188,5 @@ def _is_same(decision: Mapping[str, Any], source: Source, settings: Processing) 
     latitude, longitude = decision["place"]
     computed = _p_arrival_at(latitude, longitude, source)
     end = UTCDateTime(ns=decision["end"])
-    onset, method = first_wave(picks.__getitem__, computed, settings.pick_tolerance, end)
+    onset, method = first_wave(picks.__getitem__, computed, end)
     return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])

@@ -17,6 +17,9 @@ from per_obspy.processing.series import first_least, without_line
 
 TINY = np.finfo(float).tiny
 
+#: Shortest noise window that is used, and time between its end and the first wave, s.
+SHORTEST_NOISE, ONSET_MARGIN = 2.0, 0.5
+
 #: Fewest samples, and shortest time in s, up to the peak of a record that can be picked.
 FEWEST, SHORTEST = 20, 0.5
 
@@ -36,7 +39,7 @@ def noise_windows(
     The pick is that of the vertical, on which P is largest, or else the median of the horizontals.
     With a known event a pick farther from the computed P than the tolerance is discarded, and the
     computed P is used if no pick is left. Without a clear wave there is no noise, and none where it
-    is shorter than ``shortest_noise``; ``pre_event`` of the settings is the noise without a pick.
+    is shorter than `SHORTEST_NOISE`; ``pre_event`` of the settings is the noise without a pick.
     Samples far from the first wave are cut: the hours of a continuous record.
 
     ``stats.per_obspy`` gets ``noise`` (s from the first sample, 0 for none), ``onset_source`` and,
@@ -46,25 +49,23 @@ def noise_windows(
     if given is not None:
         note: dict[str, str | float] = {"noise": given, "onset_source": "configuration"}
         return Stream([with_note(trace, f"noise: first {given:g} s", **note) for trace in traces])
-    onset, method = _onset(traces, settings.pick_tolerance, source)
+    onset, method = _onset(traces, source)
     # The first wave of all components
     out = Stream()
     for trace in traces:
         # Seconds from the first sample of this component
         noise, when = 0.0, {}
         if onset is not None:
-            end = min(onset, trace.stats.endtime) - settings.onset_margin
+            end = min(onset, trace.stats.endtime) - ONSET_MARGIN
             quiet, when = float(end - trace.stats.starttime), {"onset": str(onset)}
-            noise = quiet if quiet >= settings.shortest_noise else 0.0
+            noise = quiet if quiet >= SHORTEST_NOISE else 0.0
         step = f"noise: first {noise:.2f} s ({method})"
         noted = with_note(trace, step, noise=noise, onset_source=method, **when)
         out += _trim(noted, onset, settings) if onset is not None else noted
     return out
 
 
-def _onset(
-    traces: list[Trace], tolerance: float, source: Source | None
-) -> tuple[UTCDateTime | None, str]:
+def _onset(traces: list[Trace], source: Source | None) -> tuple[UTCDateTime | None, str]:
     """Return the time of the first wave, None if there is no clear one, and the method."""
     computed = p_arrival(traces[0], source) if source and traces else None
     picks = dict[str, list[UTCDateTime]]()
@@ -75,7 +76,7 @@ def _onset(
         return picks[direction]
 
     end = max((trace.stats.endtime for trace in traces), default=UTCDateTime(0))
-    onset, method = first_wave(pick, computed, tolerance, end)
+    onset, method = first_wave(pick, computed, end)
     # With its causes, from which an update of the event is judged
     if source is not None and computed is not None and onset is not None:
         place = traces[0].stats.coordinates

@@ -4,6 +4,7 @@ import logging
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from obspy import Inventory, Stream
 from per_obspy import config
 from per_obspy.errors import Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
+from per_obspy.processing.account import rejection, taken
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.asdf import find_asdf_stations, has_event
@@ -31,6 +33,9 @@ from per_obspy.records.sds import find_sds_stations
 from per_obspy.records.text_table import read_described
 
 log = logging.getLogger(__name__)
+
+#: Reason of stations and channels that the configuration leaves out.
+LEFT_OUT = "left out by records.without"
 
 
 class StationSource(NamedTuple):
@@ -128,7 +133,7 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
         opened.append(find_asdf_stations(records.asdf.file, records.asdf.tag))
     if fetched:
         opened.append(fetched_stations(fetched))
-    return _served(opened, file, earthquakes)
+    return _served(opened, file, earthquakes, records.without)
 
 
 def find_path_sources(paths: Sequence[Path]) -> Sources:
@@ -164,7 +169,10 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
 
 
 def _served(
-    opened: Iterable[RecordSource], event: EventFile | None, earthquakes: list[dict[str, object]]
+    opened: Iterable[RecordSource],
+    event: EventFile | None,
+    earthquakes: list[dict[str, object]],
+    without: Sequence[str] = (),
 ) -> Sources:
     """Return each station of the first source that has it, with what all sources reject."""
     sources = Sources({}, event, (), {event.path: event.hash} if event else {}, earthquakes)
@@ -176,11 +184,15 @@ def _served(
         expected |= _expected(source)
         # The first source that has a station serves it
         for name, paths in source.stations.items():
-            reason = _unusable(name, paths, sources.stations.get(name))
+            reason = _unusable(name, paths, sources.stations.get(name), without)
             if reason is not None:
                 rejected.append(reason)
             else:
-                sources.stations[name] = _station(name, paths, source, sources.hashes)
+                reader = reader_without(source.reader, name, without)
+                part = source._replace(reader=reader)
+                sources.stations[name] = _station(name, paths, part, sources.hashes)
+    # Every name of the configuration should be of a station
+    _warn_of_absent(without, {*sources.stations, *(row.name for row in rejected)})
     expected |= set(sources.stations)
     return sources._replace(rejected=tuple(rejected), expected=frozenset(expected))
 
@@ -194,13 +206,15 @@ def _expected(source: RecordSource) -> set[str]:
 
 
 def _unusable(
-    name: str, paths: tuple[Path, ...], earlier: StationSource | None
+    name: str, paths: tuple[Path, ...], earlier: StationSource | None, without: Sequence[str]
 ) -> Rejection | None:
-    """Return the row of a station that another source serves, or whose codes name no file."""
+    """Return the row of a station that is left out, or served by another source, or misnamed."""
     # Codes become names of station files, records and figures
     if problem := code_problem(*name.split(".", 1)):
         files = ", ".join(sorted({str(path) for path in paths}))
         return Rejection("station", shortened(name, SHOWN), files, None, (problem,))
+    if name in without:
+        return Rejection("station", name, os.path.commonpath(paths), None, (LEFT_OUT,))
     if earlier is None:
         return None
     reason = f"is also in {os.path.commonpath(earlier.files)}, which comes first"
@@ -215,6 +229,65 @@ def _station(
     network, station = name.split(".", 1)
     metadata = source.inventory and source.inventory.select(network=network, station=station)
     return StationSource(paths, tuple(hashes[path] for path in paths), metadata, source.reader)
+
+
+def _warn_of_absent(without: Sequence[str], stations: set[str]) -> None:
+    """Log names that are of no station: one that is written wrongly would stay in use."""
+    for name in without:
+        if ".".join(name.split(".")[:2]) not in stations:
+            log.warning("records.without: no records of %s", name)
+
+
+class _NamedReader(Reader):
+    """A reader that other processes know by name, as a part of another one."""
+
+    def __repr__(self) -> str:
+        return f"{self.func.__name__} {self.keywords}"
+
+
+def reader_without(reader: Reader, station: str, without: Sequence[str]) -> Reader:
+    """
+    Return a reader of a station that leaves out channels.
+
+    Parameters
+    ----------
+    reader : partial
+        Of all channels.
+    station : str
+        ``"NET.STA"``.
+    without : sequence of str
+        Channels of this and other stations, ``"NET.STA.LOC.CHA"`` with wildcards.
+    """
+    channels = tuple(name for name in without if name.startswith(f"{station}."))
+    if not channels:
+        return reader
+    inner = _NamedReader(reader.func, **reader.keywords)
+    return partial(read_without, reader=inner, channels=channels)
+
+
+def read_without(
+    paths: Iterable[Path],
+    inventory: Inventory | None,
+    station: str | None = None,
+    *,
+    reader: Reader,
+    channels: Sequence[str],
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """Read a station without some channels; each trace, and each name of none, is a row."""
+    stream, rejected = reader(paths, inventory, station)
+    out, rows, names = Stream(), list(rejected), set(channels)
+    for trace in taken(stream):
+        matching = [name for name in channels if fnmatchcase(trace.id, name)]
+        names -= set(matching)
+        # A trace that stays has one owner
+        if matching:
+            rows.append(rejection(trace, LEFT_OUT))
+        else:
+            out += trace
+    files = ", ".join(path.name for path in paths)
+    absent = ("records.without: no such channel",)
+    rows += [Rejection("record", name, files, None, absent) for name in sorted(names)]
+    return out, tuple(rows)
 
 
 def _event_file(records: config.Records, fetched: Fetched | None) -> EventFile | None:

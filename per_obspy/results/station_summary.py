@@ -30,8 +30,8 @@ COLUMNS: dict[str, Column] = {
         ("state", "", "used: its record serves the pairs near it; rejected: it serves none"),
         ("rejected", "", "rejected records of the station, with every reason"),
         ("flags", "", "flags that every pair of the station has, separated by spaces"),
-        ("warnings", "", "failed checks of its records that do not reject, with channel"),
-        ("notes", "", "failed checks of its records without consequence, with channel"),
+        ("warnings", "", "failed checks of its records to look at, with channel"),
+        ("notes", "", "failed checks of its records that are bookkeeping, with channel"),
     ),
     **_columns("int64", ("pairs", "1", "number of pairs for which the record is used")),
     **_columns(

@@ -13,6 +13,7 @@ from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spe
 from per_obspy.errors import CatalogError, Rejection, WriteError
 from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.names import inside
+from per_obspy.processing.account import USED_ANYWAY, trusting
 from per_obspy.progress import Progress
 from per_obspy.records.earthquakes.quakeml import EventFile
 from per_obspy.records.fdsn.cache import Fetched
@@ -90,8 +91,9 @@ def find_station_tasks(context: RunContext, fetched: Fetched | None) -> FoundSta
     progress("finding records", 1, 1)
 
     # One task per station
+    trust = settings.records.trust if settings.records else ()
     tasks = station_tasks(
-        found.stations, _shards(folder), settings.processing, settings.spectra, found.event
+        found.stations, _shards(folder), settings.processing, settings.spectra, found.event, trust
     )
     earthquakes = with_event(found.earthquakes, found.event and found.event.event)
     known = KnownStations.of(found.expected, found.stations, found.waiting)
@@ -104,6 +106,7 @@ def station_tasks(
     processing: Processing,
     spectra: Spectra,
     event: EventFile | None = None,
+    trust: Sequence[str] = (),
 ) -> list[StationTask]:
     """
     Return one task per station, sorted by name, which writes a station file.
@@ -118,19 +121,22 @@ def station_tasks(
         Settings.
     event : EventFile, optional
         The earthquake.
+    trust : sequence of str
+        Stations whose records are used although checks of plausibility reject them.
 
     Raises
     ------
     CatalogError
         If a station file would be outside of that folder, because a link leads out of it.
     """
+    trusted = processing.model_copy(update={"checks": trusting(processing.checks)})
     return [
         StationTask(
             station=name,
             source=source.files,
             inventory=source.inventory,
             event=event,
-            processing=processing,
+            processing=trusted if name in trust else processing,
             spectra=spectra,
             shard=inside(shards, f"{file_stem(name)}.nc"),
             hashes=source.hashes,
@@ -184,7 +190,7 @@ class ComparedStations(NamedTuple):
     stations : list of FinishedStation
         All of them: with the flags and warnings of the comparison, or rejected by it.
     trusted : dict
-        ``kept``: trusted stations that the comparison would have rejected; ``plausible``: those
+        ``kept``: trusted stations that a check would have rejected; ``plausible``: those
         that it would not; ``unknown``: trusted names of which there is no record.
     """
 
@@ -219,7 +225,7 @@ def compared_stations(
         if comparison.rejected and _name_of(station) not in trust:
             compared.append(_rejected(station, comparison.rejected))
             continue
-        kept += [_name_of(station)] if comparison.rejected else []
+        kept += [_name_of(station)] if comparison.rejected or _is_used_anyway(station) else []
         compared.append(_flagged(station, comparison))
     # Trusted names, by what trust has changed
     names = {_name_of(station) for station in stations}
@@ -238,6 +244,11 @@ def _name_of(station: FinishedStation) -> str:
     if station.spectra is not None:
         return str(station.spectra["station"].item())
     return station.station if "." in station.station else f".{station.station}"
+
+
+def _is_used_anyway(station: FinishedStation) -> bool:
+    """Return whether the records of a station are used only because it is trusted."""
+    return station.spectra is not None and USED_ANYWAY in str(station.spectra["warnings"].item())
 
 
 def _source(earthquakes: Sequence[Mapping[str, Any]], spectra: Sequence[xr.Dataset]) -> Earthquake:

@@ -49,6 +49,23 @@ CHANNELS = {"HNN": (0.0, 0.0), "HNE": (90.0, 0.0), "HNZ": (0.0, -90.0)}
 #: Key of the random numbers of the variation between places, which no station's number is.
 FIELD = 1_000_000
 
+#: Density, kg/m3, and velocity of S waves, m/s, at the source (Boore 2003).
+DENSITY, SHEAR_VELOCITY = 2800.0, 3500.0
+
+#: Correlation of the north and east components, and spectrum of the vertical relative to theirs: a
+#: choice of this package, weak as records show, and the usual two thirds.
+CORRELATION, VERTICAL = 0.3, 2.0 / 3.0
+
+#: Background before the P wave, s.
+PRE_EVENT = 20.0
+
+#: Log-standard deviation of the frequency of the lakebed between stations.
+LAKEBED_SCATTER = 0.1
+
+#: Distance at which the correlation of spectra between places has fallen to 0.05, m (SA at 1 s:
+#: Jayaram & Baker 2009).
+SITE_REACH = 25_000.0
+
 #: P waves relative to S waves: velocity and amplitude.
 P_VELOCITY, P_AMPLITUDE = np.sqrt(3.0), 0.2
 
@@ -207,7 +224,7 @@ def _station(scenario: Scenario, number: int) -> SimulatedStation:
         latitude, longitude, scenario.lakebed_latitude, scenario.lakebed_longitude
     )
     # The frequency of the lakebed scatters from station to station
-    scatter = np.exp(scenario.lakebed_scatter * _random(scenario, number, 0).standard_normal())
+    scatter = np.exp(LAKEBED_SCATTER * _random(scenario, number, 0).standard_normal())
     lakebed = scenario.lakebed_frequency * scatter if from_lake < scenario.lakebed_radius else None
     return SimulatedStation(f"S{number + 1:03d}", round(latitude, 5), round(longitude, 5), lakebed)
 
@@ -218,8 +235,8 @@ def _records(
     """Return the records of a station, counts; they begin before the P waves."""
     places = scenario.latitude, scenario.longitude, station.latitude, station.longitude
     distance = float(np.hypot(gps2dist_azimuth(*places)[0], scenario.depth))
-    p_wave = UTCDateTime(scenario.origin_time) + distance / (P_VELOCITY * scenario.shear_velocity)
-    start = p_wave - scenario.pre_event
+    p_wave = UTCDateTime(scenario.origin_time) + distance / (P_VELOCITY * SHEAR_VELOCITY)
+    start = p_wave - PRE_EVENT
     header = {"network": NETWORK, "station": station.code, "delta": scenario.dt, "starttime": start}
     # One trace per component
     motion = _acceleration(scenario, number, station, distance)
@@ -235,7 +252,7 @@ def _acceleration(
     """Return north, east and up in m/s2, (3, n_samples): background, P waves, S waves."""
     distance = effective_distance(hypocentral, scenario.magnitude)
     shaking = duration(scenario.magnitude, distance)
-    s_wave = scenario.pre_event + hypocentral / scenario.shear_velocity * (1.0 - 1.0 / P_VELOCITY)
+    s_wave = PRE_EVENT + hypocentral / SHEAR_VELOCITY * (1.0 - 1.0 / P_VELOCITY)
     n_samples = _n_samples(scenario, station, s_wave, shaking)
     # As many zeros again, so that the end of a filtered motion does not wrap round to its front
     n_padded = fft.next_fast_len(2 * n_samples, real=True)
@@ -244,10 +261,10 @@ def _acceleration(
     # Background noise, then the two waves, each from separate noise
     generator = _random(scenario, number, 1)
     motion = scenario.noise * generator.standard_normal((3, n_samples))
-    for arrival, amplitude in ((scenario.pre_event, P_AMPLITUDE), (s_wave, 1.0)):
+    for arrival, amplitude in ((PRE_EVENT, P_AMPLITUDE), (s_wave, 1.0)):
         delay = round(arrival / scenario.dt)
         shape = np.concatenate([np.zeros(delay), window[: n_padded - delay]])
-        noise = _noise(generator, n_padded, scenario.correlation)
+        noise = _noise(generator, n_padded)
         wave = shaped_noise(noise, shape, spectra, scenario.dt)
         motion += amplitude * wave[:, :n_samples]
     return motion
@@ -261,10 +278,10 @@ def _n_samples(scenario: Scenario, station: SimulatedStation, s_wave: float, sha
     return int(np.ceil(lasts / scenario.dt))
 
 
-def _noise(generator: np.random.Generator, n_samples: int, correlation: float) -> FloatArray:
+def _noise(generator: np.random.Generator, n_samples: int) -> FloatArray:
     """Return three rows of noise of which the first two are correlated."""
     north, east, up = generator.standard_normal((3, n_samples))
-    return np.stack([north, correlation * north + np.sqrt(1.0 - correlation**2) * east, up])
+    return np.stack([north, CORRELATION * north + np.sqrt(1.0 - CORRELATION**2) * east, up])
 
 
 def _spectra(
@@ -272,26 +289,22 @@ def _spectra(
 ) -> NDArray[np.complex128]:
     """Return the Fourier spectra of north, east and up, m/s, (3, n_frequencies)."""
     frequency = fft.rfftfreq(n_samples, scenario.dt)
-    source = source_spectrum(
-        frequency, scenario.magnitude, scenario.shear_velocity, scenario.density
-    )
+    source = source_spectrum(frequency, scenario.magnitude, SHEAR_VELOCITY, DENSITY)
     path = path_spectrum(
-        frequency, distance, scenario.shear_velocity, scenario.quality, scenario.quality_exponent
+        frequency, distance, SHEAR_VELOCITY, scenario.quality, scenario.quality_exponent
     )
     # Metres north and east of the city; the shorter way round, across the date line too
     north = METRES_PER_DEGREE * (station.latitude - scenario.city_latitude)
     degrees = (station.longitude - scenario.city_longitude + 180.0) % 360.0 - 180.0
     east = METRES_PER_DEGREE * degrees * np.cos(np.deg2rad(scenario.city_latitude))
-    variation = log_variation(
-        _random(scenario, FIELD), (east, north), scenario.site_reach, frequency
-    )
+    variation = log_variation(_random(scenario, FIELD), (east, north), SITE_REACH, frequency)
     # Rock, and for a station on it the lakebed
     site = rock_response(frequency, scenario.kappa)
     rock = source * path * site * np.exp(scenario.site_log_std * variation)
     motion = rock.astype(np.complex128)
     if station.lakebed is not None:
         motion *= kanai_tajimi(frequency, station.lakebed, scenario.lakebed_damping)
-    return np.stack([motion, motion, scenario.vertical * motion])
+    return np.stack([motion, motion, VERTICAL * motion])
 
 
 def scenario_inventory(scenario: Scenario, stations: list[SimulatedStation]) -> Inventory:

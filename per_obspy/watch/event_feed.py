@@ -21,7 +21,7 @@ from per_obspy.records.earthquakes.quakeml import (
 from per_obspy.records.earthquakes.services import event_content, listed_events
 from per_obspy.records.fdsn.web import WebPool
 from per_obspy.watch.relevance import Circle
-from per_obspy.watch.state import WatchState, iso, moment
+from per_obspy.watch.state import WatchState, moment
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +37,9 @@ OVERLAP = 600.0
 #: Difference of origin times from which an answer is another earthquake, s (reasoned: revisions
 #: move an origin by less than a minute, aftershocks that are listed come minutes later).
 OTHER_EVENT = 600.0
+
+#: Largest number of earthquakes in one request.
+MOST_EVENTS = 20_000
 
 #: Suffixes of QuakeML files.
 SUFFIXES = (".xml", ".quakeml")
@@ -91,14 +94,13 @@ def read_feed(watch: Watch, state: WatchState, circle: Circle, now: datetime) ->
     """
     if watch.folder is not None:
         return _folder_feed(watch.folder, state.seen)
-    assert watch.service is not None  # Watch demands a service or a folder
-    query = _query(watch, circle, now)
-    since = _since(watch, state, now)
-    pool = _pool()
-    if since is None:
+    query, pool = _query(watch, circle, now), _pool()
+    # A time that is still to come was noted before the clock was put back
+    if not watch.updatedafter or state.since is None or moment(state.since) > now:
         rows, problems = _listed(pool, watch, query)
     else:
-        rows, problems = _listed_since(pool, watch, query, since)
+        since = moment(state.since) - timedelta(seconds=OVERLAP)
+        rows, problems = _listed_since(pool, watch, query, f"{since:%Y-%m-%dT%H:%M:%S}")
     return Feed({row.event_id: row for row in rows}, {}, tuple(problems), {})
 
 
@@ -113,7 +115,7 @@ def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
     query = {
         "starttime": f"{start:%Y-%m-%dT%H:%M:%S}",
         "orderby": "time",
-        "limit": f"{watch.most_events}",
+        "limit": f"{MOST_EVENTS}",
     }
     # A circle of the whole Earth excludes no event
     if circle.radius < 180.0:
@@ -121,14 +123,6 @@ def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
         query |= {name: f"{value:.4f}" for name, value in place.items()}
         query["maxradius"] = f"{circle.radius:.4f}"
     return query
-
-
-def _since(watch: Watch, state: WatchState, now: datetime) -> str | None:
-    """Return the time since which changes are requested, None for all earthquakes."""
-    # A time that is still to come was noted before the clock was put back
-    if not watch.updatedafter or state.since is None or moment(state.since) > now:
-        return None
-    return f"{moment(state.since) - timedelta(seconds=OVERLAP):%Y-%m-%dT%H:%M:%S}"
 
 
 def _listed_since(
@@ -150,13 +144,13 @@ def _listed(
     """Return the listed earthquakes; beyond the limit of a list also all strong enough ones."""
     service = watch.service or ""
     rows, problems = listed_events(pool, service, query)
-    if len(rows) < watch.most_events:
+    if len(rows) < MOST_EVENTS:
         return rows, problems
     # Weak ones must not crowd out strong ones
     smallest = min(reach.magnitude for reach in watch.magnitudes)
     log.warning(
         "%s: lists %d earthquakes or more: asked again from magnitude %g",
-        *(public_url(service), watch.most_events, smallest),
+        *(public_url(service), MOST_EVENTS, smallest),
     )
     strong, others = listed_events(pool, service, {**query, "minmagnitude": f"{smallest:g}"})
     return [*rows, *strong], [*problems, *others]
@@ -196,25 +190,11 @@ def _quakeml_files(folder: Path) -> list[Path]:
     return [path for path in paths if path.suffix.lower() in SUFFIXES and not is_part(path)]
 
 
-class PresentEvent(NamedTuple):
+def present_event(
+    watch: Watch, event_id: str, file: str, time: str
+) -> tuple[Earthquake, bytes] | None:
     """
-    Current facts of an earthquake in its service or file.
-
-    Attributes
-    ----------
-    row : Earthquake
-        Its facts.
-    quakeml : bytes
-        QuakeML with time, place and magnitude alone.
-    """
-
-    row: Earthquake
-    quakeml: bytes
-
-
-def present_event(watch: Watch, event_id: str, file: str, time: str) -> PresentEvent | None:
-    """
-    Return the current facts of an earthquake, None if it has been deleted.
+    Return current facts of an earthquake and QuakeML of them; None if it has been deleted.
 
     Parameters
     ----------
@@ -250,7 +230,7 @@ def present_event(watch: Watch, event_id: str, file: str, time: str) -> PresentE
         source = public_url(watch.service or str(watch.folder))
         reason = f"answers for {shortened(event_id, 80)} with an earthquake of {row.time[:19]}"
         raise ServiceError(f"{source}: {reason}, listed was {time[:19]}")
-    return PresentEvent(row, plain_quakeml(event, event_id))
+    return row, plain_quakeml(event, event_id)
 
 
 def _event_of_service(service: str, event_id: str) -> Any:
@@ -266,16 +246,3 @@ def _event_of_service(service: str, event_id: str) -> Any:
         reason = f"{source}: answer is not the earthquake {event_id}: {error}"
         raise ServiceError(reason) from error
     return event
-
-
-def noted_poll(state: WatchState, feed: Feed, now: datetime) -> WatchState:
-    """Return the state of a watched folder after a poll that succeeded."""
-    update = {
-        "last_poll": iso(now),
-        "since": iso(now),
-        "failures": 0,
-        "not_before": None,
-        "last_error": None,
-        "seen": feed.seen,
-    }
-    return state.model_copy(update=update)

@@ -30,21 +30,17 @@ from per_obspy.records.file_list import file_states, files_below, growing_files
 from per_obspy.results.ranked_table import table_outputs
 from per_obspy.runs.output_folder import Result
 from per_obspy.runs.run import run
-from per_obspy.watch.event_feed import present_event
 from per_obspy.watch.event_settings import (
     Watcher,
-    has_other_sources,
     settings_of_event,
-    watch_of,
 )
-from per_obspy.watch.open_events import DELETED, closed, judged, with_facts
+from per_obspy.watch.polling import present_state
 from per_obspy.watch.revisions import (
     content_of,
     newest_revision,
     point_latest,
     publish,
     revision_facts,
-    shown_content,
 )
 from per_obspy.watch.state import (
     LONGEST_PAUSE,
@@ -161,7 +157,7 @@ def is_look_due(watcher: Watcher, state: EventState) -> bool:
     state : EventState
         Of the earthquake.
     """
-    watch, now = watch_of(watcher.settings), watcher.now()
+    watch, now = watcher.watch, watcher.now()
     if state.state != "open" or not state.missing or is_held(now, state):
         return False
     times = [moment(time) for time in (*state.done.values(), *filter(None, [state.looked]))]
@@ -188,7 +184,7 @@ def looked(watcher: Watcher, state: EventState) -> tuple[EventState, bool]:
         If services fail and no record is at hand.
     """
     now = watcher.now()
-    delays = passed_delays(now, state, watch_of(watcher.settings).delays)
+    delays = passed_delays(now, state, watcher.watch.delays)
     done = [delay for delay in delays if f"{delay:g}" in state.done]
     state = changed(state, looked=iso(now))
     if not done:
@@ -236,59 +232,52 @@ def done_task(watcher: Watcher, state: EventState, task: Task) -> Done:
     PerError
         If the run fails; finished parts are kept.
     """
-    watch = watch_of(watcher.settings)
     started = iso(watcher.now())
-    present = present_event(watch, state.event_id, state.file, state.time)
-    if present is None:
-        return Done(closed(state, DELETED), f"closed: {DELETED}")
     # Its place or magnitude may have changed since it was listed
-    state = with_facts(changed(state, confirmed=started), present.row)
-    (reason,) = judged(watch, watcher.places, [present.row])
-    if reason:
-        return Done(closed(state, reason), f"closed: {reason}")
+    state, quakeml = present_state(watcher, state)
+    if state.state == "closed":
+        return Done(state, f"closed: {state.reason}")
     folder = event_folder(watcher.folder, state.event_id)
-    _write_if_new(folder / "event.xml", present.quakeml)
-    settings = settings_of_event(watcher.settings, folder, state, task.delay)
-
-    return _run_with_records(watcher, settings, state, (task, started))
+    event = folder / "event.xml"
+    if not event.is_file() or event.read_bytes() != quakeml:
+        with written_whole(event) as part:
+            part.write_bytes(quakeml)
+    return _run_with_records(watcher, folder, state, task, started)
 
 
 def _run_with_records(
-    watcher: Watcher, settings: Run, state: EventState, occasion: tuple[Task, str]
+    watcher: Watcher, folder: Path, state: EventState, task: Task, started: str
 ) -> Done:
     """Fetch the records of an earthquake, and run with those available."""
-    watch, (task, started) = watch_of(watcher.settings), occasion
+    settings = settings_of_event(watcher.settings, folder, state, task.delay)
     # Records that come while the run goes on are for the next one
     arrivals = arrivals_of(watcher.settings)
     fetched = fetched_for(watcher, settings)
-    complete = fetched is None or fetched.is_complete
-    passed = [delay for delay in watch.delays if delay <= task.delay]
-    done = {**state.done, **{f"{delay:g}": started for delay in passed}}
-    state = changed(state, changed=False, complete=complete, done=done, arrivals=arrivals)
-    missing = has_missing(fetched)
-    state = changed(state, fetched=records_hash(fetched), missing=missing)
-    # The number is in the page and the summary
+    passed = [delay for delay in watcher.watch.delays if delay <= task.delay]
+    state = changed(
+        state,
+        changed=False,
+        complete=fetched is None or fetched.is_complete,
+        done={**state.done, **{f"{delay:g}": started for delay in passed}},
+        arrivals=arrivals,
+        fetched=records_hash(fetched),
+        missing=has_missing(fetched),
+    )
     if not _has_records(settings, fetched):
         return Done(state, "no records yet")
-    folder = event_folder(watcher.folder, state.event_id)
+    # The number is in the page and the summary
     number = max(state.revision, newest_revision(folder)) + 1
     facts = {"event_id": state.event_id, "revision": number, "revised": started}
     result = run(settings, None, watcher.executor, watcher.progress, facts, fetched)
-    return _published(folder, state, result, occasion)
-
-
-def _write_if_new(file: Path, content: bytes) -> None:
-    """Write a file unless it has the same content already."""
-    if file.is_file() and file.read_bytes() == content:
-        return
-    with written_whole(file) as part:
-        part.write_bytes(content)
+    return _published(folder, state, result, task, started)
 
 
 def _has_records(settings: Run, fetched: Fetched | None) -> bool:
     """Return whether records or a ShakeMap are available for a run."""
-    assert settings.records is not None
-    if has_other_sources(settings.records):
+    records = settings.records
+    assert records is not None
+    others = (records.folder, records.columns, records.sds, records.asdf, records.shakemap)
+    if any(map(bool, others)):
         return True
     return fetched is not None and bool(fetched_stations(fetched).stations)
 
@@ -312,19 +301,18 @@ def arrivals_of(settings: Run) -> str:
     return digest.hexdigest()
 
 
-def _published(folder: Path, state: EventState, result: Result, occasion: tuple[Task, str]) -> Done:
+def _published(folder: Path, state: EventState, result: Result, task: Task, started: str) -> Done:
     """Make a revision of the results of a run, if they differ from those of the newest one."""
     record, newest = result.record, newest_revision(folder)
     if not table_outputs(record["outputs"]):
         return Done(state, "no pair could be screened: see work/rejected.csv", result)
     # Unchanged results are no new revision
     shown = content_of(record, file_hash(folder / "event.xml"))
-    if newest and shown_content(folder, newest) == shown:
+    if newest and revision_facts(folder, newest).get("key") == shown:
         point_latest(folder)
         return Done(changed(state, revision=newest), f"revision {newest} stays", result)
     # A run that a killed watcher had finished bears the number that it was given
     number = max(state.revision, newest) + 1
-    task, started = occasion
     facts = {
         "event_id": state.event_id,
         "revision": number,

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from per_obspy.config import Fdsn, Records, Run, Watch, Window, checked
+from per_obspy.config import Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress
@@ -19,7 +19,7 @@ from per_obspy.watch.state import EventState, moment
 STEP = 10.0
 
 #: Retries of a request for records; what still fails is asked for by the next run.
-RETRIES, LONGEST_PAUSE = 2, 5.0
+RETRIES = 2
 
 #: Age from which a record file of a watched folder counts as finished, s.
 SETTLE = 10.0
@@ -55,6 +55,12 @@ class Watcher(NamedTuple):
     now: Callable[[], datetime]
     progress: Progress
     executor: Executor | None
+
+    @property
+    def watch(self) -> Watch:
+        """Section of the watcher, which `read_settings` demands."""
+        assert self.settings.watch is not None
+        return self.settings.watch
 
 
 def read_settings(file: Path) -> Run:
@@ -106,12 +112,6 @@ def _refuse_one_event(file: Path, records: dict[str, Any]) -> None:
                 raise CatalogError(str(file), problem)
 
 
-def watch_of(settings: Run) -> Watch:
-    """Return the section of the watcher, which :func:`read_settings` demands."""
-    assert settings.watch is not None
-    return settings.watch
-
-
 def settings_of_event(settings: Run, folder: Path, state: EventState, delay: float) -> Run:
     """
     Return the settings of the run of an earthquake.
@@ -130,12 +130,17 @@ def settings_of_event(settings: Run, folder: Path, state: EventState, delay: flo
         Of the run, s after the origin time.
     """
     assert settings.records is not None
-    records, ends = settings.records, delay - watch_of(settings).latency
-    # Windows end where records may end by now
-    origin = _rounded(state)
+    assert settings.watch is not None
+    # Windows end where records may end by now, and begin at multiples of a step
+    records, ends = settings.records, delay - settings.watch.latency
+    origin = moment(state.time)
+    origin -= timedelta(seconds=origin.timestamp() % STEP)
     changes: dict[str, object] = {"event": folder / "event.xml"}
+    # Downloads stay with the earthquake, and what fails is left for the next run
     if records.fdsn is not None:
-        changes["fdsn"] = _placed_fdsn(records.fdsn, folder, origin, ends)
+        fdsn, window = records.fdsn, _window(records.fdsn, origin, ends)
+        patience = {"cache": folder / "records", "retries": min(fdsn.retries, RETRIES)}
+        changes["fdsn"] = fdsn.model_copy(update={**patience, **window})
     if records.sds is not None:
         changes["sds"] = records.sds.model_copy(update=_window(records.sds, origin, ends))
     update = {
@@ -147,28 +152,8 @@ def settings_of_event(settings: Run, folder: Path, state: EventState, delay: flo
     return settings.model_copy(update=update)
 
 
-def _rounded(state: EventState) -> datetime:
-    """Return the origin time, rounded down to a multiple of :data:`STEP`."""
-    origin = moment(state.time)
-    return origin - timedelta(seconds=origin.timestamp() % STEP)
-
-
-def _placed_fdsn(fdsn: Fdsn, folder: Path, origin: datetime, ends: float) -> Fdsn:
-    """Return the request for the records of an earthquake."""
-    pause = LONGEST_PAUSE if fdsn.longest_pause is None else fdsn.longest_pause
-    patience = {"retries": min(fdsn.retries, RETRIES), "longest_pause": pause}
-    place = {"cache": folder / "records"}
-    return fdsn.model_copy(update={**place, **patience, **_window(fdsn, origin, ends)})
-
-
 def _window(window: Window, origin: datetime, ends: float) -> dict[str, str]:
     """Return start and end of the window of records."""
     start = origin - timedelta(seconds=window.before)
     end = origin + timedelta(seconds=min(window.after, ends))
     return {"start": f"{start:%Y-%m-%dT%H:%M:%S.%f}", "end": f"{end:%Y-%m-%dT%H:%M:%S.%f}"}
-
-
-def has_other_sources(records: Records) -> bool:
-    """Return whether there are sources of records other than FDSN services."""
-    others = (records.folder, records.columns, records.sds, records.asdf, records.shakemap)
-    return any(bool(source) for source in others)

@@ -5,7 +5,6 @@ Health of a folder of results: state of its watcher or latest run, for monitorin
 ``per-obspy status`` and monitoring read it.
 """
 
-import json
 import os
 import platform
 from collections.abc import Sequence
@@ -14,22 +13,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from per_obspy.config.section import Moment, Section
-from per_obspy.errors import CatalogError, reason_of, shortened
-from per_obspy.files import written_whole
+from per_obspy.config.section import Moment
+from per_obspy.errors import CatalogError
 from per_obspy.resume import Comparison, Status, StatusError, compare_outputs
 from per_obspy.resume import read_status as read_record
+from per_obspy.watch.state import State, moment, read_state, write_json
 
 #: Name of the file in the folder that is watched into.
 STATUS = "status.json"
 
-#: Bytes of the largest status file that is read.
-LARGEST = 1 << 20
 
-
-class WatchStatus(Section):
+class WatchStatus(State):
     """
     State of a watcher after its latest poll.
 
@@ -59,9 +55,6 @@ class WatchStatus(Section):
         Of per_obspy.
     """
 
-    # Later versions may write more
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
-
     last_poll: Moment | None = None
     events_open: int = Field(0, ge=0)
     last_error: str | None = None
@@ -84,11 +77,8 @@ def write_status(folder: Path, status: WatchStatus) -> Path:
     WriteError
         If the machine cannot write.
     """
-    file = folder / STATUS
-    with written_whole(file) as part:
-        text = json.dumps(status.model_dump(mode="json"), indent=1)
-        part.write_text(f"{text}\n", encoding="utf-8")
-    return file
+    write_json(folder / STATUS, status.model_dump(mode="json"))
+    return folder / STATUS
 
 
 def read_status(folder: Path) -> WatchStatus:
@@ -100,22 +90,7 @@ def read_status(folder: Path) -> WatchStatus:
     CatalogError
         If the folder has no status, or a damaged one.
     """
-    file = folder / STATUS
-    try:
-        with file.open(encoding="utf-8") as text:
-            return WatchStatus.model_validate_json(text.read(LARGEST))
-    except ValidationError as error:
-        problem = _first_fault(error)
-    except (OSError, ValueError) as error:
-        problem = shortened(reason_of(error), 200)
-    raise CatalogError(str(file), f"not the status of a watcher: {problem}")
-
-
-def _first_fault(error: ValidationError) -> str:
-    """Return field and reason of the first fault of a status file."""
-    fault = error.errors()[0]
-    place = ".".join(map(str, fault["loc"]))
-    return f"{place}: {fault['msg']}" if place else fault["msg"]
+    return read_state(folder / STATUS, WatchStatus)
 
 
 #: Record of a run in its folder.
@@ -171,7 +146,9 @@ def folder_health(folder: Path, late: float = LATE, now: datetime | None = None)
     """
     if (folder / STATUS).exists():
         health = _watcher(read_status(folder), late, now or datetime.now(UTC))
-        return _with_comparison(health, _newest_revisions(folder))
+        # The newest results of every earthquake, the latest first
+        newest = folder.glob("events/*/latest/revision.json")
+        return _with_comparison(health, sorted(newest, key=_time_of, reverse=True))
     if (folder / RECORD).exists():
         return _run(folder / RECORD)
     raise CatalogError(
@@ -179,10 +156,9 @@ def folder_health(folder: Path, late: float = LATE, now: datetime | None = None)
     )
 
 
-def _newest_revisions(folder: Path) -> list[Path]:
-    """Return the description of the newest results of every earthquake, the latest first."""
-    files = [(file.stat().st_mtime, file) for file in folder.glob("events/*/latest/revision.json")]
-    return [file for _, file in sorted(files, reverse=True)]
+def _time_of(file: Path) -> float:
+    """Return the time at which a file was written, s."""
+    return file.stat().st_mtime
 
 
 def _with_comparison(health: Health, files: Sequence[Path]) -> Health:
@@ -225,7 +201,9 @@ def _comparison_lines(comparison: Comparison) -> list[str]:
 
 def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
     """Return the health of a watcher."""
-    behind = _seconds_behind(status.next_due, now)
+    # Negative before it is due
+    due = status.next_due
+    behind = (now - moment(due)).total_seconds() if due is not None else 0.0
     # The reason that needs a person first comes first
     if status.running and not _is_alive(status):
         state = "stopped"
@@ -240,7 +218,7 @@ def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
         f"events open: {status.events_open}",
         f"next due: {status.next_due or 'never'}" + (f", {behind:.0f} s ago" if behind > 0 else ""),
     ]
-    lines += _ignored_lines(status)
+    lines += _ignored_lines(status.ignored)
     if status.last_error:
         lines.append(f"last error: {status.last_error} ({status.failures} in succession)")
     if status.last_notification_error:
@@ -249,22 +227,10 @@ def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
     return Health(state, tuple(lines), {"state": state, **status.model_dump(mode="json")})
 
 
-def _ignored_lines(status: WatchStatus) -> list[str]:
+def _ignored_lines(ignored: Sequence[str]) -> list[str]:
     """Return the earthquakes without runs, the latest first; none if there are none."""
-    if not status.ignored:
-        return []
-    latest = status.ignored[: -SHOWN - 1 : -1]
-    return [f"events ignored: {len(status.ignored)}", *(f"  {line}" for line in latest)]
-
-
-def _seconds_behind(due: str | None, now: datetime) -> float:
-    """Return the time since a watcher was due, s; negative before."""
-    if due is None:
-        return 0.0
-    moment = datetime.fromisoformat(due)
-    # A time without a zone is UTC
-    zoned = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-    return (now - zoned).total_seconds()
+    latest = [f"  {line}" for line in ignored[: -SHOWN - 1 : -1]]
+    return [f"events ignored: {len(ignored)}", *latest] if ignored else []
 
 
 def _is_alive(status: WatchStatus) -> bool:

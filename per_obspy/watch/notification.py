@@ -17,7 +17,7 @@ from pathlib import Path
 from signal import SIGKILL
 from typing import NamedTuple
 
-from per_obspy.config.operation.notify import Kind, Notify
+from per_obspy.config.watch import Kind, Notify
 from per_obspy.errors import MissingExtra, PerError, reason_of, require_extra, shortened
 
 log = logging.getLogger(__name__)

@@ -5,7 +5,6 @@ Run with configured notification of its first result, changed class counts and f
 about, so that the same counts and the same failure are notified once.
 """
 
-import json
 import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,21 +12,18 @@ from typing import Any
 
 from per_obspy.config import Notify, Run, load
 from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of, shortened
-from per_obspy.files import written_whole
 from per_obspy.progress import Progress, silent
 from per_obspy.results.ranked_table import table_files
 from per_obspy.runs.output_folder import Result, now
 from per_obspy.runs.run import run
 from per_obspy.watch.logs import without_secrets
 from per_obspy.watch.notification import Message, notify
+from per_obspy.watch.state import read_json, write_json
 
 log = logging.getLogger(__name__)
 
 #: File of the latest message in the folder of the results.
 LATEST = "notification.json"
-
-#: Bytes of the largest file of a latest message that is read.
-LARGEST = 1 << 20
 
 
 def notified_run(
@@ -85,16 +81,17 @@ def notify_result(
     # Counts that were notified before are no news
     place = shown or folder
     counts = class_counts(place)
-    earlier = _latest(folder).get("classes")
+    earlier = read_json(folder / LATEST).get("classes")
     if earlier == counts:
         return ()
     # The title alone is enough for a small screen
-    words = ", ".join(f"{count} {label}" for label, count in counts.items())
     known = earlier if isinstance(earlier, dict) else None
     change = "first result" if known is None else f"changed from {_words(known)}"
-    title = f"{name}: {words} ({change})"
-    text = _text(place / "summary.txt") or title
-    message = Message("first" if known is None else "changed", title, text, _report(place))
+    title = f"{name}: {_words(counts)} ({change})"
+    page, summary = place / "report.html", place / "summary.txt"
+    text = _text(summary) or title
+    report = page if page.is_file() else summary
+    message = Message("first" if known is None else "changed", title, text, report)
     return _sent(settings, folder, message, {"classes": counts})
 
 
@@ -107,7 +104,7 @@ def notify_failure(settings: Notify, folder: Path, name: str, reason: str) -> tu
     reasons : tuple of str
         One line per way that failed.
     """
-    reason, latest = without_secrets(reason), _latest(folder)
+    reason, latest = without_secrets(reason), read_json(folder / LATEST)
     if latest.get("failure") == reason:
         return ()
     message = Message("failure", f"{name}: failed", reason)
@@ -134,8 +131,7 @@ def _sent(
     reasons = notify(settings, message)
     latest = {"kind": message.kind, "time": now(), "failed": list(reasons), **facts}
     try:
-        with written_whole(folder / LATEST) as part:
-            part.write_text(json.dumps(latest, indent=1), encoding="utf-8")
+        write_json(folder / LATEST, latest)
     except WriteError as error:
         log.warning("%s", error)
         return (*reasons, str(error))
@@ -153,7 +149,7 @@ def undelivered(folders: Iterable[Path]) -> str | None:
     """
     newest: tuple[str, int, dict[str, Any]] = ("", 0, {})
     for folder in folders:
-        if latest := _latest(folder):
+        if latest := read_json(folder / LATEST):
             # Messages of one second are in the order of their files
             written = (folder / LATEST).stat().st_mtime_ns
             newest = max(
@@ -161,16 +157,6 @@ def undelivered(folders: Iterable[Path]) -> str | None:
             )
     failed = newest[2].get("failed")
     return shortened(str(failed[0]), 300) if isinstance(failed, list) and failed else None
-
-
-def _latest(folder: Path) -> dict[str, Any]:
-    """Return the latest message of a folder, empty without one."""
-    try:
-        with (folder / LATEST).open(encoding="utf-8") as file:
-            found = json.loads(file.read(LARGEST))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _words(counts: Mapping[str, object]) -> str:
@@ -184,9 +170,3 @@ def _text(file: Path) -> str:
         return file.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         return f"{file.name}: {reason_of(error)}"
-
-
-def _report(folder: Path) -> Path:
-    """Return the page of a result, else its summary."""
-    page = folder / "report.html"
-    return page if page.is_file() else folder / "summary.txt"

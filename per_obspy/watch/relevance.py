@@ -1,6 +1,6 @@
 """Relevance of earthquakes: their magnitude by the distance from epicentre to inventory."""
 
-import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -8,15 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from per_obspy.checks import FloatArray
-from per_obspy.config import Reach, Run
+from per_obspy.config import Reach, Run, TableForm
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
-from per_obspy.files import written_whole
 from per_obspy.inventory.catalogue import Box, stored_inventories
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
+from per_obspy.watch.state import read_json, write_json
 
 #: Side of the cells that stand for the pairs in them, degrees.
 CELL = 0.05
+
+#: Half the diagonal of a cell at the equator, m.
+RADIUS = CELL * METRES_PER_DEGREE / math.sqrt(2.0)
 
 #: Rows of the pair table that are read at once.
 ROWS = 100_000
@@ -92,44 +95,31 @@ def inventory_places(settings: Run, folder: Path) -> Places:
 def _kept_places(file: Path, settings: Run, folder: Path) -> Places:
     """Return the places of a pair table, from the watched folder if the table has not changed."""
     assert settings.pairs is not None
-    form = settings.pairs.form
     try:
         facts = file.stat()
     except OSError as error:
         raise CatalogError(str(file), f"cannot be read: {error.strerror}") from error
     # The table is read again if it has changed
+    form = settings.pairs.form
     key = [str(file), facts.st_size, facts.st_mtime_ns, form.model_dump_json()]
-    kept = folder / PLACES
-    known = _read_places(kept, key)
-    if known is None:
-        known = _places_of_table(file, settings)
-        lists = [known.longitude.tolist(), known.latitude.tolist()]
-        with written_whole(kept) as part:
-            part.write_text(json.dumps({"key": key, "places": lists}), encoding="utf-8")
-    return known
-
-
-def _read_places(kept: Path, key: list[object]) -> Places | None:
-    """Return the stored places of a watched folder under a key, None if there are none."""
+    kept = read_json(folder / PLACES)
     try:
-        content = json.loads(kept.read_text(encoding="utf-8"))
-        longitude, latitude = np.array(content["places"], dtype=np.float64)
-        return Places(longitude, latitude, _radius()) if content["key"] == key else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        longitude, latitude = np.array(kept["places"], dtype=np.float64)
+        if kept["key"] == key:
+            return Places(longitude, latitude, RADIUS)
+    except (ValueError, KeyError, TypeError):
+        pass
+    places = _places_of_table(file, form)
+    lists = [places.longitude.tolist(), places.latitude.tolist()]
+    write_json(folder / PLACES, {"key": key, "places": lists})
+    return places
 
 
-def _radius() -> float:
-    """Return half the diagonal of a cell at the equator, m."""
-    return float(CELL * METRES_PER_DEGREE / np.sqrt(2.0))
-
-
-def _places_of_table(file: Path, settings: Run) -> Places:
+def _places_of_table(file: Path, form: TableForm) -> Places:
     """Return the centres of the cells that hold a pair of a table."""
-    assert settings.pairs is not None
     cells = np.empty((0, 2), dtype=np.int64)
     # Chunk by chunk, so that memory does not grow with the table
-    for chunk in PairInventory([file], settings.pairs.form).chunks(ROWS):
+    for chunk in PairInventory([file], form).chunks(ROWS):
         pairs = checked_chunk(chunk)
         position = pairs[["longitude_1", "latitude_1"]].to_numpy(dtype=np.float64)
         known = position[np.isfinite(position).all(axis=1)]
@@ -139,7 +129,7 @@ def _places_of_table(file: Path, settings: Run) -> Places:
     if not len(cells):
         raise CatalogError(str(file), "no pair has a place: give watch.region")
     centres = (cells.astype(np.float64) + 0.5) * np.float64(CELL)
-    return Places(centres[:, 0], centres[:, 1], _radius())
+    return Places(centres[:, 0], centres[:, 1], RADIUS)
 
 
 def _places_of_boxes(boxes: Sequence[Box], catalog: Path) -> Places:

@@ -1,7 +1,6 @@
-"""Table ``changes.csv``: the difference between a revision and the one before."""
+"""Revisions of the results of an earthquake, and ``changes.csv``: what each has changed."""
 
 import csv
-import json
 import os
 import re
 import shutil
@@ -9,18 +8,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-import pyarrow as pa
-
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, file_hash, temporary_folder, writing, written_whole
 from per_obspy.inventory.files.text_cells import cell
 from per_obspy.names import inside
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import table_files, table_outputs
-from per_obspy.resume import Status, StatusError, read_status, write_status
+from per_obspy.resume import write_status
 from per_obspy.runs.output_folder import RECORD
 from per_obspy.runs.provenance import CONFIGURATION
+from per_obspy.watch.state import read_json
 
 #: Name of the table in a revision.
 CHANGES = "changes.csv"
@@ -107,9 +104,8 @@ def _station_states(table: Path) -> dict[str, str]:
     """Return the state of every station of a table, empty without a table."""
     if not table.is_file():
         return {}
-    columns = ["station", "state"]
-    found = pd.read_csv(table, usecols=columns, dtype="str", keep_default_na=False)
-    return dict(zip(found["station"], found["state"], strict=True))
+    with table.open(encoding="utf-8", newline="") as file:
+        return {row["station"]: row["state"] for row in csv.DictReader(file)}
 
 
 def _table_changes(
@@ -122,27 +118,18 @@ def _table_changes(
     with bounded_database(tables[1][0].parent) as database:
         database.register("old", old)
         database.register("new", new)
+        # Rows whose value differs, or which only one table has
         for quantity in quantities:
-            query = _query(identifier, quantity)
+            query = (
+                f"SELECT {identifier} AS name, old.{quantity} AS before, new.{quantity} AS after "
+                f"FROM old FULL OUTER JOIN new USING ({identifier}) "
+                f"WHERE old.{quantity} IS DISTINCT FROM new.{quantity} ORDER BY name"
+            )
             for batch in batches(database, query, ROWS):
-                for name, before, after in _rows(batch):
-                    yield (kind, name, quantity, before, after)
-
-
-def _query(identifier: str, quantity: str) -> str:
-    """Return the query for the rows whose value differs or which only one table has."""
-    return (
-        f"SELECT {identifier} AS name, old.{quantity} AS before, new.{quantity} AS after "
-        f"FROM old FULL OUTER JOIN new USING ({identifier}) "
-        f"WHERE old.{quantity} IS DISTINCT FROM new.{quantity} ORDER BY name"
-    )
-
-
-def _rows(batch: pa.RecordBatch) -> Iterator[Row]:
-    """Yield the rows of a piece of a table; a missing row has the value absent."""
-    lists = [column.to_pylist() for column in batch.columns]
-    for name, before, after in zip(*lists, strict=True):
-        yield (name, *("absent" if value is None else value for value in (before, after)))
+                for row in batch.to_pylist():
+                    values = [row["before"], row["after"]]
+                    values = ["absent" if value is None else value for value in values]
+                    yield (kind, row["name"], quantity, *values)
 
 
 #: Folder of the revisions, link to the newest, and description of each.
@@ -190,15 +177,6 @@ def content_of(record: Mapping[str, Any], event_hash: str) -> str:
     tables = {name: record["outputs"].get(name, "") for name in COMPARED}
     tables |= table_outputs(record["outputs"])
     return content_hash({"tables": tables, "event": event_hash})
-
-
-def shown_content(event: Path, number: int) -> str:
-    """Return the stored hash of the content of a revision, empty if missing or damaged."""
-    try:
-        status = read_status(revision_folder(event, number) / REVISION)
-    except StatusError:
-        return ""
-    return str(status["key"])
 
 
 def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[str, Any]) -> Path:
@@ -254,8 +232,12 @@ def _shared_files(
     event: Path, made: Path, outputs: Mapping[str, str], before: Path | None
 ) -> dict[str, str]:
     """Put the results of a run into a new revision, and return the hash of each."""
-    known = _known_files(before) if before else {}
     work, hashes = event / WORK, dict(outputs)
+    # Files of the revision before by their hash; none if it is damaged
+    earlier = read_json(before / REVISION).get("outputs") if before else None
+    known = dict[str, Path]()
+    if before and isinstance(earlier, dict):
+        known = {str(digest): before / name for name, digest in earlier.items()}
     for name, digest in sorted(outputs.items()):
         _share(inside(work, name), inside(made, name), digest, known.get(digest))
     # Files that no run lists
@@ -263,15 +245,6 @@ def _shared_files(
         hashes[file.name] = file_hash(file)
         _share(file, made / file.name, hashes[file.name], known.get(hashes[file.name]))
     return hashes
-
-
-def _known_files(revision: Path) -> dict[str, Path]:
-    """Return the files of a revision by their hash; none if it is damaged or there is none."""
-    try:
-        status: Status = read_status(revision / REVISION)
-    except StatusError:
-        return {}
-    return {str(digest): revision / name for name, digest in status["outputs"].items()}
 
 
 def _share(source: Path, target: Path, digest: str, earlier: Path | None) -> None:
@@ -336,10 +309,4 @@ def point_latest(event: Path) -> None:
 
 def revision_facts(event: Path, number: int) -> dict[str, Any]:
     """Return the content of ``revision.json``, empty if there is none."""
-    try:
-        facts: dict[str, Any] = json.loads(
-            (revision_folder(event, number) / REVISION).read_text(encoding="utf-8")
-        )
-    except (OSError, ValueError):
-        return {}
-    return facts
+    return read_json(revision_folder(event, number) / REVISION)

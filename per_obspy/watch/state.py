@@ -13,7 +13,7 @@ times still to come.
 
 import json
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -37,16 +37,16 @@ WATCH, EVENT = "watch.json", "event.json"
 LARGEST = 1 << 24
 
 
-class _State(Section):
+class State(Section):
     """A group of values that a later version of the program may extend."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
-StateType = TypeVar("StateType", bound=_State)
+StateType = TypeVar("StateType", bound=State)
 
 
-class EventState(_State):
+class EventState(State):
     """
     State of one earthquake.
 
@@ -135,7 +135,7 @@ class EventState(_State):
         return Earthquake(**values)
 
 
-class WatchState(_State):
+class WatchState(State):
     """
     State of a watched folder.
 
@@ -213,19 +213,19 @@ def event_folder(folder: Path, event_id: str) -> Path:
 
 def write_event_state(folder: Path, state: EventState) -> None:
     """Write the state of an earthquake, whole or not at all, into its folder."""
-    _write(folder / EVENT, state)
+    write_json(folder / EVENT, state.model_dump(mode="json"))
 
 
 def write_watch_state(folder: Path, state: WatchState) -> None:
     """Write the state of a watched folder, whole or not at all."""
-    _write(folder / WATCH, state)
+    write_json(folder / WATCH, state.model_dump(mode="json"))
 
 
 def read_watch_state(folder: Path) -> WatchState:
     """Return the state of a watched folder; an empty one if there is none or it is damaged."""
     # Without it everything is asked for again
     try:
-        return _read(folder / WATCH, WatchState)
+        return read_state(folder / WATCH, WatchState)
     except CatalogError:
         return WatchState()
 
@@ -244,7 +244,7 @@ def read_event_states(folder: Path) -> tuple[dict[str, EventState], list[str]]:
     states, problems = dict[str, EventState](), list[str]()
     for file in sorted(folder.glob(f"events/*/{EVENT}")):
         try:
-            state = _read(file, EventState)
+            state = read_state(file, EventState)
         except CatalogError as error:
             problems.append(str(error))
         else:
@@ -257,14 +257,7 @@ def changed(known: EventState, /, **values: Any) -> EventState:
     return EventState(**{**known.model_dump(), **values})
 
 
-def _write(file: Path, state: _State) -> None:
-    """Write a state as JSON."""
-    text = json.dumps(state.model_dump(mode="json"), indent=1)
-    with written_whole(file) as part:
-        part.write_text(f"{text}\n", encoding="utf-8")
-
-
-def _read(file: Path, kind: type[StateType]) -> StateType:
+def read_state(file: Path, kind: type[StateType]) -> StateType:
     """Return a state from its file; raise ``CatalogError`` if it cannot be read."""
     # A file of another program may be of any size
     try:
@@ -278,6 +271,22 @@ def _read(file: Path, kind: type[StateType]) -> StateType:
     except (OSError, ValueError) as error:
         problem = f"cannot be read: {shortened(reason_of(error), 200)}"
         raise CatalogError(str(file), problem) from error
+
+
+def write_json(file: Path, content: Mapping[str, Any]) -> None:
+    """Write plain values as JSON, whole or not at all."""
+    with written_whole(file) as part:
+        part.write_text(f"{json.dumps(content, indent=1)}\n", encoding="utf-8")
+
+
+def read_json(file: Path) -> dict[str, Any]:
+    """Return the content of a JSON file; empty if it is missing or damaged."""
+    try:
+        with file.open(encoding="utf-8") as text:
+            content = json.loads(text.read(LARGEST))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 #: Pauses after failures, s: the shortest, which doubles, and the longest.
@@ -328,19 +337,15 @@ def due_task(
         return None
     # A finished earthquake is screened again only if it is updated
     is_open = state.state == "open"
+    is_unfinished = not state.complete or state.failures > 0
     conditions = {
         "delay": is_open and not is_done(now, state, passed[-1]),
         "update": state.changed,
         "records": is_open and has_arrivals,
-        "retry": is_open and not is_paused(now, state.not_before) and _is_unfinished(state),
+        "retry": is_open and is_unfinished and not is_paused(now, state.not_before),
     }
     reasons = tuple(name for name, holds in conditions.items() if holds)
     return Task(passed[-1], reasons) if reasons else None
-
-
-def _is_unfinished(state: EventState) -> bool:
-    """Return whether the latest run has failed, or lacked an answer of a service."""
-    return not state.complete or state.failures > 0
 
 
 def is_held(now: datetime, state: EventState) -> bool:
@@ -413,10 +418,10 @@ def noted_faults(errors: list[PerError]) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # noqa: BLE001 - of a service, a run or a way of delivery
-        errors.append(_known_fault(error))
+        errors.append(_fault_for_users(error))
 
 
-def _known_fault(error: Exception) -> PerError:
+def _fault_for_users(error: Exception) -> PerError:
     """Convert any error to one for users; log the traceback of a programming error."""
     # A missing file of the configuration is a wrong name, as for other commands
     fault = machine_fault(error, missing=not isinstance(error, PerError))

@@ -16,16 +16,16 @@ from typing import NamedTuple
 from per_obspy import termination
 from per_obspy.config import Run, Watch
 from per_obspy.errors import PerError, TryLater, shortened
+from per_obspy.files import remove_file
 from per_obspy.progress import Progress, silent
-from per_obspy.runs.output_folder import locked_folder
+from per_obspy.runs.output_folder import RECORD, Result, locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
-from per_obspy.watch.event_settings import Watcher, watch_of
+from per_obspy.watch.event_settings import Watcher
 from per_obspy.watch.health import WatchStatus, write_status
-from per_obspy.watch.notified_run import undelivered
-from per_obspy.watch.outbox import deliver, deliver_waiting, message_waits
+from per_obspy.watch.notified_run import notify_failure, notify_result, undelivered
 from per_obspy.watch.polling import confirm, is_over, keep, polled
 from per_obspy.watch.relevance import inventory_places
-from per_obspy.watch.revisions import WORK, point_latest
+from per_obspy.watch.revisions import WORK, point_latest, revision_folder
 from per_obspy.watch.state import (
     INCOMPLETE,
     EventState,
@@ -42,6 +42,8 @@ from per_obspy.watch.state import (
     noted_faults,
     pause,
     read_event_states,
+    read_json,
+    write_json,
 )
 
 log = logging.getLogger(__name__)
@@ -116,10 +118,11 @@ def watch_once(
     WriteError
         If the state cannot be written.
     """
-    used = clock or Clock()
-    folder = settings.output.resolve()
+    folder, used = settings.output.resolve(), clock or Clock()
     with locked_folder(folder):
-        return _one_pass(_watcher(settings, folder, (used, progress, executor)), running=False)
+        places = inventory_places(settings, folder)
+        watcher = Watcher(settings, folder, places, used.now, progress, executor)
+        return _one_pass(watcher, running=False)
 
 
 def watch_forever(
@@ -136,27 +139,19 @@ def watch_forever(
     used = clock or Clock()
     folder, failures, end = settings.output.resolve(), 0, False
     with locked_folder(folder):
-        watcher = _watcher(settings, folder, (used, progress, executor))
+        places = inventory_places(settings, folder)
+        watcher = Watcher(settings, folder, places, used.now, progress, executor)
         while not end:
             try:
-                found = _one_pass(watcher, running=True)
-                failures, seconds = 0, (found.next_due - used.now()).total_seconds()
+                next_due = _one_pass(watcher, running=True).next_due
+                failures, seconds = 0, (next_due - used.now()).total_seconds()
             except TryLater as error:
                 # The state could not be written: all else is kept, and done again
                 failures += 1
                 log.error("%s", error)
                 seconds = pause(failures)
-            longest = watch_of(settings).poll
-            end = termination.requested() or used.wait(min(max(seconds, 1.0), longest))
-
-
-def _watcher(
-    settings: Run, folder: Path, means: tuple[Clock, Progress, Executor | None]
-) -> Watcher:
-    """Return the settings and state that the passes share."""
-    clock, progress, executor = means
-    places = inventory_places(settings, folder)
-    return Watcher(settings, folder, places, clock.now, progress, executor)
+            seconds = min(max(seconds, 1.0), watcher.watch.poll)
+            end = termination.requested() or used.wait(seconds)
 
 
 def _one_pass(watcher: Watcher, running: bool) -> Pass:
@@ -167,8 +162,11 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
     # A power cut may have come between a revision and the link to it
     errors = list[PerError]()
     for event_id in states:
-        _point_latest(event_folder(watcher.folder, event_id), errors)
-    deliver_waiting(watcher, states)
+        with noted_faults(errors):
+            point_latest(event_folder(watcher.folder, event_id))
+    # Messages that a killed watcher has left
+    for event in states.values():
+        deliver(watcher, event)
     state = polled(watcher, states, errors)
     confirm(watcher, states, errors)
     come = _records_that_came(watcher, states, errors)
@@ -180,14 +178,6 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
         if is_over(watcher, state):
             state = polled(watcher, states, errors)
     return _ended(watcher, states, state, errors, running)
-
-
-def _point_latest(folder: Path, errors: list[PerError]) -> None:
-    """Let ``latest`` lead to the newest revision; a failure stops no other earthquake."""
-    try:
-        point_latest(folder)
-    except PerError as error:
-        errors.append(error)
 
 
 def _records_that_came(
@@ -212,7 +202,7 @@ def _most_urgent(
     watcher: Watcher, states: dict[str, EventState], come: set[str]
 ) -> tuple[str, Task] | None:
     """Return the earthquake whose run comes next: those without a result first, larger first."""
-    now, watch = watcher.now(), watch_of(watcher.settings)
+    now, watch = watcher.now(), watcher.watch
     arrivals = arrivals_of(watcher.settings)
     # The identifier makes the order certain
     found = []
@@ -242,30 +232,85 @@ def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerEr
     faults = list[PerError]()
     with noted_faults(faults):
         done = done_task(watcher, state, task)
-    for fault in faults:
-        errors.append(fault)
-        log.error("%s: %s", name, fault)
-        return _failure(watcher, failed(state, str(fault), watcher.now(), fault))
-    log.info("%s: %s", name, done.line)
-    # What is missing because a service failed is asked for again after a pause
-    if done.state.complete:
-        after = changed(done.state, failures=0, not_before=None, last_error=None)
+    if faults:
+        errors += faults
+        log.error("%s: %s", name, faults[0])
+        after = failed(state, str(faults[0]), watcher.now(), faults[0])
+        message_waits(watcher, after, after.last_error or "")
     else:
-        after = failed(done.state, INCOMPLETE, watcher.now(), None)
-    # The message waits on the disk before the run counts as done
-    if done.result is not None:
-        message_waits(watcher, after)
+        log.info("%s: %s", name, done.line)
+        # What is missing because a service failed is asked for again after a pause
+        if done.state.complete:
+            after = changed(done.state, failures=0, not_before=None, last_error=None)
+        else:
+            after = failed(done.state, INCOMPLETE, watcher.now(), None)
+        # The message waits on the disk before the run counts as done
+        if done.result is not None:
+            message_waits(watcher, after)
     keep(watcher, {state.event_id: state}, after)
     deliver(watcher, after)
     return after
 
 
-def _failure(watcher: Watcher, state: EventState) -> EventState:
-    """Write the state of an earthquake whose run failed, and notify people."""
-    message_waits(watcher, state, state.last_error or "")
-    keep(watcher, {state.event_id: state}, state)
-    deliver(watcher, state)
-    return state
+#: Message about an earthquake that waits for delivery, in its folder: a message waits on the disk
+#: before the state of its run is written, and leaves when it was delivered or all ways of delivery
+#: have failed. The next watcher delivers what a killed one has left: each message at least once,
+#: and twice only if the watcher is killed between the delivery and the note of it.
+OUTBOX = "outbox.json"
+
+
+def message_waits(watcher: Watcher, state: EventState, failure: str | None = None) -> None:
+    """
+    Put the message about a run into the folder of its earthquake, in place of an earlier one.
+
+    Parameters
+    ----------
+    watcher : Watcher
+        Settings and folder.
+    state : EventState
+        Of the earthquake after the run.
+    failure : str, optional
+        Why the run failed; otherwise it has a result.
+
+    Raises
+    ------
+    WriteError
+        If the machine cannot write.
+    """
+    if not watcher.settings.notify.is_silent:
+        file = event_folder(watcher.folder, state.event_id) / OUTBOX
+        write_json(file, {"revision": state.revision, "failure": failure})
+
+
+def deliver(watcher: Watcher, state: EventState) -> None:
+    """Deliver the message of an earthquake that waits, if there is one, and remove it."""
+    folder = event_folder(watcher.folder, state.event_id)
+    if not (folder / OUTBOX).is_file():
+        return
+    # A result that cannot be read holds up no later message
+    faults = list[PerError]()
+    with noted_faults(faults):
+        _deliver(watcher, state, folder)
+    for fault in faults:
+        log.warning("message about %s: %s", shortened(state.event_id, 80), fault)
+    remove_file(folder / OUTBOX)
+
+
+def _deliver(watcher: Watcher, state: EventState, folder: Path) -> None:
+    """Deliver a message; one about counts or a failure that people know is not sent again."""
+    settings, label = watcher.settings.notify, f"{watcher.settings.name}: {state.event_id}"
+    message, work = read_json(folder / OUTBOX), folder / WORK
+    failure, number = message.get("failure"), message.get("revision")
+    if not isinstance(number, int):
+        return
+    if failure is not None:
+        notify_failure(settings, work, label, str(failure))
+        return
+    # The folder of the runs works on: people are shown the revision, which never changes
+    shown = revision_folder(folder, number) if number else None
+    record = read_json((shown or work) / RECORD)
+    if "state" in record:
+        notify_result(settings, Result(work, record, did_nothing=False), label, shown)
 
 
 def _ended(
@@ -276,7 +321,7 @@ def _ended(
     running: bool,
 ) -> Pass:
     """Close the pass: earthquakes that are too old are finished, and the status is written."""
-    now, watch = watcher.now(), watch_of(watcher.settings)
+    now, watch = watcher.now(), watcher.watch
     for known in list(states.values()):
         if _is_finished(known, watch, now):
             keep(watcher, states, changed(known, state="finished"))

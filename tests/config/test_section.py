@@ -2,7 +2,7 @@
 A configuration that is wrong is refused with file, key and value.
 
 Covers ``per_obspy.config.run``, ``per_obspy.config.records``, ``per_obspy.config.processing``,
-``per_obspy.config.screening``, ``per_obspy.config.pairs`` and ``per_obspy.config.ensemble``.
+``per_obspy.config.screening``, ``per_obspy.config.pairs`` and ``per_obspy.config.run``.
 """
 
 from pathlib import Path

@@ -19,6 +19,7 @@ from per_obspy.processing.account import (
     rejection,
     survivors,
     taken,
+    trusting,
     with_flags,
     with_note,
 )
@@ -115,6 +116,23 @@ def test_levels_decide_what_a_finding_means():
         )
     assert caught.value.reasons == ("four", "five", "one; three", "six")
     assert "per_obspy" not in trace.stats
+
+
+def test_records_of_trusted_stations_pass_checks_of_plausibility_alone():
+    trace = _trace()
+    findings = Findings(trusting(Checks()))
+    findings.compare("impossible_acceleration", 100.0)
+    accepted = judge(trace, findings)
+    # used, flagged, and said to be
+    (reason,) = accepted.stats.per_obspy.warnings.split("; ")
+    assert reason.endswith("100, allowed 86 (used: records.trust)")
+    assert record_flags(accepted) == ["implausible_record"]
+    # what a recorder lost, trust does not bring back; what warns anyway needs no trust
+    findings.compare("unusual_velocity", 4.0, "HNE")
+    assert "trust" not in findings[-1].reason
+    findings.add("clipped_run", "clipped: 9 equal samples")
+    with pytest.raises(RecordRejected):
+        judge(trace, findings)
 
 
 TABLE = {-10.0: 0.5, 5.5: 0.1}

@@ -4,6 +4,7 @@ Every source of a configuration under one contract.
 Covers per_obspy.records.file_list too: the files on which a result depends.
 """
 
+import pickle
 import re
 import tomllib
 from functools import partial
@@ -21,7 +22,7 @@ from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.file_list import input_files
 from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
-from per_obspy.records.sources import find_path_sources, find_sources
+from per_obspy.records.sources import LEFT_OUT, find_path_sources, find_sources
 from per_obspy.simulation.earthquake import Simulation, scenario_event, simulate, write_simulation
 
 CHECKOUT = Path(__file__).parents[2]
@@ -305,3 +306,41 @@ def test_readers_travel_to_other_processes_by_name(folder: Path):
     for source in find_sources(Records(folder=folder), None).stations.values():
         assert isinstance(source.reader, partial)
         assert source.reader.func is read_station
+
+
+def test_stations_and_channels_that_are_left_out_are_rows(folder: Path, caplog):
+    without = ("XX.S001", "XX.S002..HNE", "XX.S002.*.HNX", "XX.S999", "XX.S9..HNZ")
+    found = find_sources(Records(folder=folder, without=without), None)
+    assert list(found.stations) == ["XX.S002"]
+    (row,) = found.rejected
+    assert (row.kind, row.name, row.reasons) == ("station", "XX.S001", (LEFT_OUT,))
+    # a name that is written wrongly is said
+    assert [message.split()[-1] for message in caplog.messages] == ["XX.S999", "XX.S9..HNZ"]
+    source = found.stations["XX.S002"]
+    stream, rejected = source.reader(source.files, source.inventory, "XX.S002")
+    assert {trace.stats.channel for trace in stream} == {"HNN", "HNZ"}
+    assert [(row.kind, row.name) for row in rejected] == [
+        ("record", "XX.S002..HNE"),
+        ("record", "XX.S002.*.HNX"),
+    ]
+    assert rejected[1].reasons == ("records.without: no such channel",)
+    assert all(row.source for row in rejected)
+    # other processes know the reader by the same words
+    again = pickle.loads(pickle.dumps(source.reader))
+    assert str(again.keywords) == str(source.reader.keywords)
+    assert " at 0x" not in str(source.reader.keywords)
+
+
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({"without": ("XX.S001",), "trust": ("XX.S001",)}, "in both without and trust"),
+        ({"without": ("S001",)}, "without"),
+        ({"without": ("XX.S001.HNE",)}, "without"),
+        ({"without": ("*.S001",)}, "without"),
+        ({"trust": ("XX.S001..HNE",)}, "trust"),
+    ],
+)
+def test_names_of_stations_and_channels_are_checked(settings, problem):
+    with pytest.raises(ValueError, match=problem):
+        Records(folder=Path("x"), **settings)

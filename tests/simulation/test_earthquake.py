@@ -14,6 +14,7 @@ from scipy import signal
 from per_obspy.config import Scenario
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.metadata import with_metadata
+from per_obspy.simulation import earthquake
 from per_obspy.simulation.earthquake import (
     CHANNELS,
     GAIN,
@@ -112,7 +113,7 @@ def test_response_and_gain_agree(simulation):
 
 def test_rounding_to_counts_lies_below_the_noise(simulation):
     assert SCENARIO.noise > 0.5 / GAIN
-    quiet = simulation.stream[0].data[: int(0.9 * SCENARIO.pre_event / SCENARIO.dt)] / GAIN
+    quiet = simulation.stream[0].data[: int(0.9 * earthquake.PRE_EVENT / SCENARIO.dt)] / GAIN
     # root mean square of 1800 samples: 2 % of scatter; some of the P wave leaks ahead of it through
     # the filters
     assert (
@@ -141,12 +142,13 @@ def test_larger_earthquakes_shake_more():
     assert ((ratios > 1.4) & (ratios < 7.0)).all()
 
 
-def test_places_vary_as_recorded_ones_do():
+def test_places_vary_as_recorded_ones_do(monkeypatch):
     # ln SA of one earthquake at places so far apart that they know nothing of each other: published
     # deviations within and between events are 0.55 to 0.7 (Boore and others 2014); of 40 places the
     # deviation itself has one of 11 %: three of them
     periods = np.array([0.2, 0.5, 1.0, 2.0])
-    far = SCENARIO.model_copy(update={"stations": 40, "lakebed_radius": 0.0, "site_reach": 500.0})
+    monkeypatch.setattr(earthquake, "SITE_REACH", 500.0)
+    far = SCENARIO.model_copy(update={"stations": 40, "lakebed_radius": 0.0})
     stream = simulate(far).stream.select(channel="HNN")
     logs = np.log([_sa(trace.data / GAIN, far.dt, periods) for trace in stream])
     deviations, correlations = logs.std(axis=0, ddof=1), np.corrcoef(logs.T)
@@ -195,9 +197,10 @@ def test_lakebed_resonates_near_two_seconds(simulation):
             assert peak < 1.4
 
 
-def test_horizontals_are_correlated_as_configured():
+def test_horizontals_are_correlated_by_the_coefficient(monkeypatch):
     def correlation(coefficient: float) -> float:
-        stream = simulate(Scenario(stations=12, correlation=coefficient, lakebed_radius=0.0)).stream
+        monkeypatch.setattr(earthquake, "CORRELATION", coefficient)
+        stream = simulate(Scenario(stations=12, lakebed_radius=0.0)).stream
         pairs = zip(stream.select(channel="HNN"), stream.select(channel="HNE"), strict=True)
         return float(np.mean([np.corrcoef(north.data, east.data)[0, 1] for north, east in pairs]))
 

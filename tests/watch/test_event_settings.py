@@ -1,6 +1,6 @@
 """Configuration of a watcher, and the settings of the run of one earthquake.
 
-Tests ``per_obspy.config.operation.watch`` as well.
+Tests ``per_obspy.config.watch`` as well.
 """
 
 import pytest

@@ -7,7 +7,7 @@ from watched_city import magnified
 
 from per_obspy.config import Notify
 from per_obspy.watch import notified_run, watch
-from per_obspy.watch.outbox import OUTBOX
+from per_obspy.watch.watch import OUTBOX
 
 #: Appends the title of a message to a file.
 PROGRAM = "import os; print(os.environ['PER_OBSPY_TITLE'], file=open(os.sys.argv[1], 'a'))"
@@ -26,7 +26,7 @@ def killed(*_, **__):
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("place", ["message_waits", "keep", "deliver"])
+@pytest.mark.parametrize("place", ["message_waits", "keep", "_deliver"])
 def test_a_kill_between_a_revision_and_its_message_delays_the_message(
     city, server, sent, simulation, monkeypatch, place
 ):
@@ -52,7 +52,7 @@ def test_a_kill_between_a_revision_and_its_message_delays_the_message(
 def test_a_kill_before_the_note_of_a_delivery_repeats_the_message(city, sent, monkeypatch):
     # At least once: whether a command was heard is known after it only
     with monkeypatch.context() as patch:
-        patch.setattr(notified_run, "written_whole", killed)
+        patch.setattr(notified_run, "write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             city.at(61)
     city.at(90)
@@ -62,7 +62,7 @@ def test_a_kill_before_the_note_of_a_delivery_repeats_the_message(city, sent, mo
 def test_the_message_about_a_failure_waits_as_well(city, sent, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(watch, "done_task", lambda *_: 1 / 0)
-        patch.setattr(watch, "deliver", killed)
+        patch.setattr(watch, "_deliver", killed)
         with pytest.raises(KeyboardInterrupt):
             city.at(61)
     assert sent() == []

@@ -17,7 +17,7 @@ from per_obspy.watch.revisions import (
     newest_revision,
     point_latest,
     publish,
-    shown_content,
+    revision_facts,
     write_changes,
 )
 
@@ -159,6 +159,6 @@ def test_content_is_known_again(event):
     record = record_of(event)
     publish(event, 1, record, {})
     digest = file_hashes(event, [event / "event.xml"])["event.xml"]
-    assert shown_content(event, 1) == content_of(record, digest)
-    assert shown_content(event, 1) != content_of(record, "other")
-    assert shown_content(event, 2) == ""
+    assert revision_facts(event, 1)["key"] == content_of(record, digest)
+    assert revision_facts(event, 1)["key"] != content_of(record, "other")
+    assert revision_facts(event, 2) == {}

@@ -2,7 +2,7 @@
 
 Tests ``per_obspy.watch.watch``, ``per_obspy.watch.event_feed``,
 ``per_obspy.watch.event_run``, ``per_obspy.watch.state`` and
-``per_obspy.watch.open_events`` as well.
+``per_obspy.watch.polling`` as well.
 """
 
 import errno
@@ -31,7 +31,7 @@ from per_obspy.files import file_hash
 from per_obspy.records.fdsn.web import PassingFault
 from per_obspy.runs.inputs.description import describe
 from per_obspy.runs.run import run
-from per_obspy.watch import event_run, watch
+from per_obspy.watch import event_feed, event_run, watch
 from per_obspy.watch.health import folder_health, read_status
 from per_obspy.watch.state import read_event_states
 from per_obspy.watch.watch import watch_forever
@@ -387,7 +387,7 @@ def test_clock_that_jumps_back_and_forth(city, server):
     assert city.revisions()[0] == "0001"
 
 
-def test_ten_thousand_earthquakes_cost_little(city, server):
+def test_ten_thousand_earthquakes_cost_little(city, server, monkeypatch):
     far = other_event(longitude=40.0)
     # All in the circle of the query are weak, and the limit is reached
     server.events = {f"w{number}": other_event(magnitude=2.0) for number in range(10)}
@@ -397,7 +397,8 @@ def test_ten_thousand_earthquakes_cost_little(city, server):
     server.events = {"far": far, "xx1": other_event()}
     tracemalloc.start()
     start = time.process_time()
-    found = city.at(59, most_events=10_000)
+    monkeypatch.setattr(event_feed, "MOST_EVENTS", 10_000)
+    found = city.at(59)
     seconds, (_, peak) = time.process_time() - start, tracemalloc.get_traced_memory()
     tracemalloc.stop()
     # 10 000 rows of about 1 kB and their table of distances, measured 30 MB

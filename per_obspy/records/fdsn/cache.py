@@ -48,6 +48,9 @@ from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_
 #: Source of rejections of stations that a service lists but has no records of.
 FDSN = "FDSN"
 
+#: Longest pause that a service may demand before a watcher leaves it for its next look, s.
+LONGEST_PAUSE = 5.0
+
 
 class Fetched(NamedTuple):
     """
@@ -160,17 +163,15 @@ def _ask_services(
 
 def _pool(request: config.Fdsn, pauses: dict[str, float] | None) -> WebPool:
     """Return connections with the patience of a request, and the pauses that services demand."""
-    longest_pause = math.inf if request.longest_pause is None else request.longest_pause
     return WebPool(
         request.timeout,
         request.retries,
         request.wait,
-        request.longest_answer,
-        request.largest_answer,
-        longest_pause,
+        # Who keeps the pauses asks again later; others wait for the service
+        longest_pause=math.inf if pauses is None else LONGEST_PAUSE,
         # A pause counts from the next fetch on: requests under way are not called off
-        dict(pauses or {}),
-        pauses,
+        resting=dict(pauses or {}),
+        demanded=pauses,
     )
 
 

@@ -1,1 +1,0 @@
-"""Settings of operation: notification and the watcher."""
