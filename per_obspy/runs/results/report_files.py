@@ -26,12 +26,11 @@ from per_obspy.report.overview import draw_overview
 from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
 from per_obspy.report.page.map_lines import lines_around, read_outlines
 from per_obspy.report.page.packing import MOST_COLUMNS
-from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.results import Results
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
-from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
+from per_obspy.report.texts import LANGUAGES
 from per_obspy.results.ranked_table import table_name
 from per_obspy.results.station_summary import COLUMNS as STATION_COLUMNS
 from per_obspy.results.totals import (
@@ -423,11 +422,11 @@ def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
     return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
 
 
-def made_with(language: Language) -> tuple[str, str]:
+def made_with(language: str) -> tuple[str, str]:
     """Return the software version as title and text of the provenance."""
     return LANGUAGES[language]["made_with"], f"per_obspy {version('per_obspy')}"
 
 
-def content_note(notes: Sequence[str], language: Language) -> list[tuple[str, str]]:
+def content_note(notes: Sequence[str], language: str) -> list[tuple[str, str]]:
     """Return sentences on the content of the page as a row of its provenance."""
-    return [(WORDING[language]["page_content"], " ".join(notes))] if notes else []
+    return [(LANGUAGES[language]["page_content"], " ".join(notes))] if notes else []

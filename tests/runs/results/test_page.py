@@ -12,6 +12,7 @@ import shutil
 import pandas as pd
 import pytest
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.runs.results import report_files
 from per_obspy.runs.run import report
 
@@ -87,7 +88,7 @@ def test_stations_are_drawn_with_their_peaks_and_spectra(content):
         drawn = content["station_drawings"][row[0]]
         peaks = [max(map(abs, drawn[name])) for name in ("north", "east")]
         # Three digits
-        assert max(peaks) == pytest.approx(row[heads.index("PGA, m/s²")], rel=5e-3)
+        assert max(peaks) == pytest.approx(row[heads.index("PGA, g")] * STANDARD_GRAVITY, rel=5e-3)
         at_one = min(range(12), key=lambda i: abs(drawn["period"][i] - 1.0))
         assert drawn["per"][at_one] == pytest.approx(row[heads.index("PER (1 s), cm")], rel=5e-3)
 
@@ -133,7 +134,7 @@ def test_revision_of_the_run_is_on_the_page(copied):
     configuration = write_configuration(copied, "[report]\nrevision = 3\n")
     report(configuration, copied / "out")
     shown = page_content(copied / "out" / "report.html")["revision"]
-    assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
+    assert re.fullmatch(r"Revision 3(, [-\d]{10} \d\d:\d\d UTC)?", shown)
 
 
 def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch):
@@ -143,7 +144,7 @@ def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch)
     buildings = pd.read_parquet(copied / "out" / "buildings.parquet")
     hit = int((buildings["neighbours_that_can_hit"] > 0).sum())
     assert hit > 3
-    number, meaning = page_content(copied / "out" / "report.html")["numbers"][2]
+    number, meaning = page_content(copied / "out" / "report.html")["numbers"][3]
     assert (number, meaning) == (str(hit), "buildings that a neighbour can hit")
 
 
