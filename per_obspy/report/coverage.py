@@ -42,15 +42,6 @@ def coverage_sentences(coverage: Coverage, language: str = "en") -> list[str]:
     return [*sentences, f"{texts['coverage_some'].format(**values)} ({reasons})."]
 
 
-def coverage_number(coverage: Coverage, language: str = "en") -> tuple[str, str]:
-    """Return the first number of a screening, pairs with a verdict, and its meaning."""
-    key = "some" if coverage.pairs > coverage.screened else "all"
-    meaning = LANGUAGES[language][f"coverage_number_{key}"]
-    return written(coverage.screened, 0, language), meaning.format(
-        all=written(coverage.pairs, 0, language)
-    )
-
-
 def search_sentence(search: Search, language: str) -> str:
     """Return the account of a search in one sentence."""
     texts, lost = LANGUAGES[language], sum(search.left_out.values())

@@ -23,7 +23,6 @@ from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
     class_colours,
-    fit_titles,
     literal,
     save,
     title_name,
@@ -180,7 +179,6 @@ def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
     # One legend and one title for everything
     _add_legend(figure, whole, table, region)
     figure.suptitle(title_name(region.title), parse_math=False)
-    fit_titles(figure)
     save(figure, path, region.simulated)
 
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from per_obspy.errors import shortened
-from per_obspy.report.coverage import coverage_number
 from per_obspy.report.results import Results, Revision
 from per_obspy.report.style import class_colours
 from per_obspy.report.tally import HARD
@@ -77,7 +76,11 @@ def alert(results: Results) -> Alert:
     if results.revision.time:
         status.insert(0, texts["alert_issued"].format(time=shortened(results.revision.time, 20)))
     limits = results.class_limits.items()
-    bounds = [f"{class_text(name, texts)} ≥ {limit:g} m/s" for name, limit in limits if limit > 0.0]
+    bounds = [
+        f"{class_text(name, texts)} ≥ {speed_text(limit, results.language)}"
+        for name, limit in limits
+        if limit > 0.0
+    ]
     return Alert(
         texts[key].format(name=name),
         colours[worst] if worst else NO_LEVEL,
@@ -91,7 +94,7 @@ def _alert_sentence(results: Results) -> str:
     """Return how many pairs hit each other, and how many of them how hard."""
     tally, stem, language = results.tally, results.stem, results.language
     known = tally.pairs - tally.states["unknown"]
-    expected = _two_digits(tally.expected)
+    expected = _rounded(tally.expected)
     share = 100.0 * tally.expected / known
     # 100 only if it is all, 0 only if it is none
     percent = written(share if share in (0.0, 100.0) else min(share, 99.0), 0, language)
@@ -103,15 +106,15 @@ def _alert_sentence(results: Results) -> str:
     clauses = [counted(language, "alert_hit", expected, stem, **whole)]
     # Fewer and fewer of them, until there is none
     for key, count in (("alert_hard", tally.hard), ("alert_columns", tally.columns)):
-        if _two_digits(count) < 1:
+        if _rounded(count) < 1:
             break
-        clauses.append(counted(language, key, _two_digits(count), stem))
+        clauses.append(counted(language, key, _rounded(count), stem))
     return f"{'; '.join(clauses)}."
 
 
-def _two_digits(count: float) -> float:
-    """Return a whole number, beyond 100 with two digits: more are never known."""
-    return float(f"{count:.2g}") if count >= 100.0 else float(round(count))
+def _rounded(count: float) -> float:
+    """Return a whole number, beyond 1 000 with three digits: more are never known."""
+    return float(f"{count:.3g}") if count >= 1000.0 else float(round(count))
 
 
 def class_text(name: str, texts: Mapping[str, str]) -> str:
@@ -119,23 +122,24 @@ def class_text(name: str, texts: Mapping[str, str]) -> str:
     return texts.get(f"class_{name}", shortened(name, LONGEST_NAME))
 
 
-def five_numbers(results: Results) -> list[tuple[str, str]]:
-    """Return five numbers of a screening, each with its meaning."""
+def key_numbers(results: Results) -> list[tuple[str, str]]:
+    """Return four numbers of a screening, each with its meaning."""
     tally, stem, language = results.tally, results.stem, results.language
     texts, worst = texts_of(language, stem), results.worst if len(results.worst) else results.listed
     # From the pairs that surely hit to those that possibly do
     sure = min(tally.states["yes"], math.floor(tally.expected))
     possible = sum(tally.states[state] for state in ("yes", "likely", "possible"))
     ends = written(sure, 0, language), written(max(possible, tally.expected), 0, language)
-    expected = written(_two_digits(tally.expected), 0, language)
+    expected, limit = written(_rounded(tally.expected), 0, language), speed_text(HARD, language)
     numbers = [
-        coverage_number(results.coverage, language),
         (f"{expected} ({ends[0]}–{ends[1]})", texts["number_hit"]),
-        (written(_two_digits(tally.hard), 0, language), texts["number_hard"]),
+        (written(_rounded(tally.hard), 0, language), texts["number_hard"].format(limit=limit)),
     ]
     if results.buildings_hit is not None:
         hit = results.buildings_hit
-        numbers.append((written(hit, 0, language), counted(language, "number_buildings", hit)))
+        numbers.append(
+            (written(hit, 0, language), counted(language, "number_buildings", hit, stem))
+        )
     else:
         unknown = tally.states["unknown"]
         numbers.append((written(unknown, 0, language), texts["number_unknown"]))
@@ -160,7 +164,7 @@ def first_steps(results: Results) -> list[str]:
 
 def _inspections(hit: pd.DataFrame, results: Results, texts: Mapping[str, str]) -> list[str]:
     """Return sentences on the first buildings or pairs, areas, and the joints of a plan."""
-    areas, buildings, hard = results.areas, results.buildings, _two_digits(results.tally.hard)
+    areas, buildings, hard = results.areas, results.buildings, _rounded(results.tally.hard)
     if len(buildings):
         steps = [texts["todo_buildings"].format(names=_names(buildings["building_id"]))]
     else:
@@ -204,7 +208,11 @@ def sureness(results: Results) -> list[str]:
         said.append(texts["sure_distance"].format(value=written(distance / 1000.0, 1, language)))
     if not tally.yielding:
         said.append(texts["sure_elastic"])
-    return [*said, texts["sure_hard"].format(limit=f"{HARD:g} m/s"), texts["sure_nature"]]
+    return [
+        *said,
+        texts["sure_hard"].format(limit=speed_text(HARD, language)),
+        texts["sure_nature"],
+    ]
 
 
 def event_sentences(facts: Mapping[str, Any], language: str = "en") -> list[str]:

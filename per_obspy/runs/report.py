@@ -14,7 +14,7 @@ from per_obspy.config import Run
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.page.document import write_page
 from per_obspy.report.page.packing import MOST_COLUMNS
-from per_obspy.report.pair_figure import draw_record_to_pair
+from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
 from per_obspy.report.results import Region, Results
 from per_obspy.report.statements import event_sentences
 from per_obspy.report.tally import PAGE_PAIRS
@@ -123,12 +123,12 @@ def _report_pairs(
         event_sentences(known, language), stations=read_stations(folder / "stations.csv"),
         provenance=_provenance(settings), class_limits=settings.screening.classes,
     )  # fmt: skip
-    results, reader, worst = _with_pairs(settings, folder, results, outlines, report)
+    results, reader = _with_pairs(settings, folder, results, outlines, report)
     # Totals, layers and the comparison with observations need no record
     report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
     write_files(results, folder, settings.spreadsheet, report)
     write_overview(results, folder, report)
-    _draw_worst_pair(worst, stations, folder, report)
+    _draw_worst_pair(differing_pair(results.worst), stations, folder, report)
     with report.tried(folder / "report.html"):
         page = with_page_data(results, folder, outlines)
         drawings = page_drawings(settings, results.worst, stations)
@@ -138,8 +138,8 @@ def _report_pairs(
 
 def _with_pairs(
     settings: Run, folder: Path, results: Results, outlines: Path | None, report: Report
-) -> tuple[Results, TableReader, "pd.Series[Any] | None"]:
-    """Return the results with their pairs, what was read of all, and the worst with a record."""
+) -> tuple[Results, TableReader]:
+    """Return the results with their pairs, and what was read of all."""
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else needed_columns(settings.totals)
     with ranked_table(table_files(folder), columns) as table:
@@ -149,7 +149,7 @@ def _with_pairs(
         results = read_table(
             results, reader, table.pieces(), folder, outlines, settings.geopackage, report
         )
-        return results, reader, table.row(reader.recorded) if reader.recorded else None
+        return results, reader
 
 
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
@@ -167,7 +167,7 @@ def _draw_worst_pair(
     folder: Path,
     report: Report,
 ) -> None:
-    """Draw the worst pair that has a record, from record to pounding; nothing without one."""
+    """Draw a pair from its record to pounding; nothing where no pair has a record."""
     if worst is None:
         return
     # Only here a station's motion is needed again
@@ -176,7 +176,7 @@ def _draw_worst_pair(
     assert station.shard is not None  # chosen so
     motion = read_station_once(station.shard, station.hash)
     with report.tried(walk):
-        draw_record_to_pair(motion, worst, walk)
+        draw_record_to_pair(motion, worst, walk, DIFFERING)
 
 
 def _number(value: Any) -> float:

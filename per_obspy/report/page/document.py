@@ -30,7 +30,7 @@ from per_obspy.report.statements import (
     alert,
     class_text,
     first_steps,
-    five_numbers,
+    key_numbers,
     revision_line,
     station_sentences,
     sureness,
@@ -73,7 +73,7 @@ LONGEST_SOURCE = 500
 #: Kinds of texts that the script never shows by their keys.
 HIDDEN = (
     "flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_", "alert_",
-    "page_", "map_title", "coverage_number", "coverage_some", "coverage_search",
+    "page_", "map_title", "coverage_some", "coverage_search",
 )  # fmt: skip
 
 #: Columns of a building on the page, and their kinds.
@@ -114,13 +114,13 @@ def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
         "title": shortened(results.region.title, LONGEST_CELL),
         "simulated": results.region.simulated,
         "alert": alert(results)._asdict(),
-        "coverage": coverage_sentences(results.coverage, language),
+        "coverage": _coverage(results),
         "coverage_bar": _coverage_bar(results, texts),
         "warns": results.coverage.lacks_many,
         "event": shortened(" ".join(results.source), LONGEST_SOURCE),
         "revision": revision_line(revision, language),
         "expected": " ".join(station_sentences(results.stations, language)),
-        "numbers": five_numbers(results),
+        "numbers": key_numbers(results),
         "first": first_steps(results),
         "sure": sureness(results),
         "states": _states(results.tally, texts),
@@ -131,6 +131,13 @@ def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
         "tables": [table.description for table in tables],
     }
     return content, tables
+
+
+def _coverage(results: Results) -> list[str]:
+    """Return the coverage in sentences, none where the bar says all of it."""
+    coverage = results.coverage
+    is_whole = coverage.pairs == coverage.screened and not coverage.search
+    return [] if is_whole else coverage_sentences(coverage, results.language)
 
 
 def _coverage_bar(results: Results, texts: Mapping[str, str]) -> list[list[Any]]:
@@ -278,7 +285,7 @@ def _described(stations: pd.DataFrame, language: str) -> pd.DataFrame:
 
 
 def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
-    """Return name, longitude, latitude of every station with a place, and whether it is used."""
+    """Return name, place and PGA (g) of every station with a place, and whether it is used."""
     if not {"longitude", "latitude"} <= set(stations):
         return []
     placed = stations[stations["longitude"].notna() & stations["latitude"].notna()]
@@ -288,6 +295,7 @@ def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
             float(row["longitude"]),
             float(row["latitude"]),
             row["state"] == "used",
+            _cell(row.get("pga", math.nan) / STANDARD_GRAVITY),
         ]
         for _, row in placed.iterrows()
     ]

@@ -20,7 +20,6 @@ from per_obspy.report.statements import (
     alert,
     class_text,
     first_steps,
-    five_numbers,
     made_sentence,
     revision_line,
     station_sentences,
@@ -67,7 +66,6 @@ def write_page(results: Results, path: Path) -> None:
     """
     figure = Figure(figsize=PAGE)
     at = _write_head(figure, results)
-    at = _write_numbers(figure, results, at)
     bottom = at - 0.30
     _draw_map(figure, results, bottom)
     texts = texts_of(results.language, results.stem)
@@ -98,7 +96,7 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
 
 
 def _write_head(figure: Figure, results: Results) -> float:
-    """Write title, warning, earthquake and stations; return how far the page is filled."""
+    """Write title, warning, alert, earthquake and stations; return how far the page is filled."""
     at = 0.955
     for line in wrap(shortened(results.region.title, 140), 70):
         figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
@@ -112,7 +110,7 @@ def _write_head(figure: Figure, results: Results) -> float:
             color=WARNING_COLOUR,
             fontweight="bold",
         )
-        at -= 0.022
+        at -= 0.024
     at = _write_alert(figure, alert(results), at)
     # Whatever has no verdict comes first
     for place, sentence in enumerate(coverage_sentences(results.coverage, results.language)):
@@ -129,7 +127,7 @@ def _write_head(figure: Figure, results: Results) -> float:
 
 def _write_alert(figure: Figure, alert: Alert, at: float) -> float:
     """Write the alert beside a band of its colour; return how far the page is filled."""
-    lines, top = wrap(f"{alert.level.upper()}. {alert.sentence}", 78), at + 0.012
+    lines, top = wrap(f"{alert.level.upper()}. {alert.sentence}", 72), at + 0.01
     for line in lines:
         figure.text(LEFT + 0.025, at, literal(line), fontsize=11.5, fontweight="bold")
         at -= 0.018
@@ -148,18 +146,6 @@ def _write_lines(
         figure.text(LEFT, at, literal(line), fontsize=size, color=colour)
         at -= LINE * size / 9.0
     return at
-
-
-def _write_numbers(figure: Figure, results: Results, at: float) -> float:
-    """Write the five numbers side by side and return how far the page is filled."""
-    # A large number over its meaning
-    width = (RIGHT - LEFT) / 5.0
-    for place, (value, meaning) in enumerate(five_numbers(results)):
-        left = LEFT + place * width
-        figure.text(left, at - 0.02, literal(value), fontsize=17, fontweight="bold")
-        for row, line in enumerate(wrap(meaning, 22)[:3]):
-            figure.text(left, at - 0.035 - 0.011 * row, literal(line), fontsize=7.5)
-    return at - 0.085
 
 
 def _write_section(

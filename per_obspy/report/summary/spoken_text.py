@@ -13,7 +13,7 @@ from per_obspy.report.statements import (
     alert,
     building_sentence,
     first_steps,
-    five_numbers,
+    key_numbers,
     made_sentence,
     pair_sentence,
     revision_line,
@@ -72,7 +72,7 @@ def _sections(results: Results) -> dict[str, list[str]]:
     # In the order of their weight for a listener
     return {
         "": _head(results),
-        texts["five_numbers"]: [f"{value} {meaning}." for value, meaning in five_numbers(results)],
+        texts["numbers"]: [f"{value} {meaning}." for value, meaning in key_numbers(results)],
         texts["do_first"]: first_steps(results),
         texts["worst_pairs"]: _numbered(pairs),
         texts["worst_buildings"]: _numbered(buildings),

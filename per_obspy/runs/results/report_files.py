@@ -119,8 +119,6 @@ class TableReader:
     ----------
     tally : PairTally
         Counts of all pairs.
-    recorded : int or None
-        Rank of the worst pair that has a record; None if no pair has one.
     """
 
     def __init__(
@@ -129,7 +127,6 @@ class TableReader:
         self.tally = PairTally(classes)
         # Settings, then the summaries of the pieces
         self.totals, self.pairs, self.is_whole = totals, pairs, is_whole
-        self.recorded: int | None = None
         self._classes = [*classes, UNKNOWN_CLASS]
         self._counted = CountedTotals()
         self._listed = list[pd.DataFrame]()
@@ -158,14 +155,6 @@ class TableReader:
         step = -(-self.pairs // SHOWN)
         columns = [name for name in SHOWN_COLUMNS if name in piece]
         self._shown.append(piece.loc[rank % step == 1 % step, columns])
-        self._add_recorded(piece)
-
-    def _add_recorded(self, piece: pd.DataFrame) -> None:
-        """Take the rows whose pounding was observed, and the first one with a record."""
-        # Pieces come in any order
-        if "station" in piece and (piece["station"] != "").any():
-            first = int(piece.loc[piece["station"] != "", "rank"].iloc[0])
-            self.recorded = min(first, self.recorded or first)
         if set(OBSERVED_COLUMNS) <= set(piece):
             self._observed.append(piece.loc[piece["observed"].notna(), OBSERVED_COLUMNS])
 

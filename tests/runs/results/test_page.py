@@ -50,7 +50,7 @@ def test_page_states_what_the_run_found(content, risk):
     assert content["pair_count"] == len(risk)
     counts = {state["name"]: state["count"] for state in content["states"]}
     assert counts["yes"] == (risk["state"] == "yes").sum()
-    assert content["numbers"][0][0] == str(len(risk))
+    assert content["coverage_bar"][0][1] == len(risk)
     assert content["expected"] == ("3 stations expected; 3 used: XX.S001, XX.S002, XX.S003.")
     assert content["revision"] == ""
     assert [row[0] for row in content["stations"]["rows"]] == ["XX.S001", "XX.S002", "XX.S003"]
@@ -144,7 +144,7 @@ def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch)
     buildings = pd.read_parquet(copied / "out" / "buildings.parquet")
     hit = int((buildings["neighbours_that_can_hit"] > 0).sum())
     assert hit > 3
-    number, meaning = page_content(copied / "out" / "report.html")["numbers"][3]
+    number, meaning = page_content(copied / "out" / "report.html")["numbers"][2]
     assert (number, meaning) == (str(hit), "buildings that a neighbour can hit")
 
 

@@ -178,7 +178,7 @@ class Page {
       bar.append(part);
       const mark = drawing("svg", { width: 12, height: 12, "aria-hidden": "true" });
       mark.append(drawing("rect", { width: 12, height: 12, fill: colour }));
-      legend.append(element("span", {}, mark, ` ${label}: ${this.whole(count)}`));
+      legend.append(element("span", {}, mark, `${label}: ${this.whole(count)}`));
     }
     byId("coverage").append(bar, legend);
     for (const text of others) byId("coverage").append(element("p", { class: "small" }, text));
