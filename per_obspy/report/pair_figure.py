@@ -74,7 +74,8 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path, note: 
     _draw_motion(motion, station, float(pair["azimuth_used"]))
     _draw_spectrum(spectrum, station, pair)
     _draw_two_gaps(right, pair, "3  ")
-    figure.text(0.005, 0.005, note, fontsize=8, color=MOTION_COLOUR)
+    if note:
+        figure.supxlabel(note, x=0.01, ha="left", fontsize=8, color=MOTION_COLOUR)
     save(figure, path, station.attrs["simulated"] == "true")
 
 
