@@ -90,6 +90,12 @@ def alert(results: Results) -> Alert:
     )
 
 
+def alert_line(results: Results) -> str:
+    """Return level and sentence of the alert of a screening on one line."""
+    level, _, sentence, *_ = alert(results)
+    return f"{level}. {sentence}"
+
+
 def _alert_sentence(results: Results) -> str:
     """Return how many pairs hit each other, and how many of them how hard."""
     tally, stem, language = results.tally, results.stem, results.language

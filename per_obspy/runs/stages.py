@@ -130,7 +130,7 @@ def new_report(context: RunContext, record: dict[str, Any]) -> Result:
     outputs = record["outputs"] | file_hashes(folder, made.outputs)
     # A picture or layer that failed is made by the next run
     key = "" if made.faults else record["key"]
-    found = {"outputs": outputs, "faults": made.faults, "key": key}
+    found = {"outputs": outputs, "faults": made.faults, "alert": made.alert, "key": key}
     return recorded(folder / RECORD, {**record, **found})
 
 
@@ -240,6 +240,7 @@ def _later_stages(
         # A picture or layer that failed is made by the next run
         "failed": outcome["failed"] or bool(made.faults),
         "faults": made.faults,
+        "alert": made.alert,
         "used": _names_of(usable, found),
         "served": found.served,
         **engine_facts(executor),

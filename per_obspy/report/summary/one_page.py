@@ -167,7 +167,9 @@ def _write_legend(figure: Figure, results: Results, at: float) -> float:
     entries = list[tuple[Text, Text, int]]()
     for name, colour in class_colours(results.region.classes).items():
         if count := results.tally.classes[name]:
-            words = literal(f"{shortened(name, 24)} {count}")
+            words = literal(
+                f"{shortened(class_text(name, LANGUAGES[results.language]), 24)} {count:,}"
+            )
             text = figure.text(0.0, 0.0, words, fontsize=7.5)
             width = 0.016 + text.get_window_extent().width / figure.bbox.width
             if left > MAP_LEFT and left + width > RIGHT:

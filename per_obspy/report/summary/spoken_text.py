@@ -11,6 +11,7 @@ from per_obspy.report.results import Results
 from per_obspy.report.statements import (
     LISTED,
     alert,
+    alert_line,
     building_sentence,
     first_steps,
     key_numbers,
@@ -84,7 +85,6 @@ def _sections(results: Results) -> dict[str, list[str]]:
 def _head(results: Results) -> list[str]:
     """Return title, alert, coverage, earthquake and stations."""
     texts, language, revision = LANGUAGES[results.language], results.language, results.revision
-    level, _, sentence, status, _ = alert(results)
     line = revision_line(revision, language)
     # Whatever has no verdict comes before the earthquake, and before the title if it is much
     account = coverage_sentences(results.coverage, language)
@@ -94,8 +94,8 @@ def _head(results: Results) -> list[str]:
         results.region.title[:200],
         *([texts["simulated_spoken"]] if results.region.simulated else []),
         *([f"{line}."] if line else []),
-        f"{level}. {sentence}",
-        status,
+        alert_line(results),
+        alert(results).status,
         *account[warned:],
         *results.source,
         *station_sentences(results.stations, language),

@@ -4,11 +4,10 @@ import csv
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,6 +26,7 @@ from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
 from per_obspy.report.page.map_lines import lines_around, read_outlines
 from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.results import Results
+from per_obspy.report.statements import alert_line
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
@@ -67,9 +67,10 @@ LISTED_COLUMNS = (
 HIT = "neighbours_that_can_hit"
 
 
-class Report(NamedTuple):
+@dataclass
+class Report:
     """
-    Files that the report has written.
+    Files that the report has written, and what it says first.
 
     Attributes
     ----------
@@ -77,10 +78,13 @@ class Report(NamedTuple):
         Its files.
     faults : list of str
         Figures and layers that could not be made, each with the reason.
+    alert : str
+        Level and sentence of the alert; empty without a pair.
     """
 
     outputs: list[Path]
     faults: list[str]
+    alert: str = ""
 
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
@@ -325,6 +329,7 @@ def write_files(results: Results, folder: Path, spreadsheet: bool, report: Repor
         Takes files and faults.
     """
     stem, region = results.stem, results.region
+    report.alert = alert_line(results)
     # Words first
     with report.tried(folder / "summary.txt"):
         write_text(results, folder / "summary.txt")

@@ -172,7 +172,7 @@ def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):
     figure.draw_without_rendering()
     boxes = {text: text.get_window_extent() for text in figure.texts if text.get_text()}
     right = 0.93 * figure.bbox.width
-    legend = [text for text in boxes if text.get_text().endswith(" 123456")]
+    legend = [text for text in boxes if text.get_text().endswith(" 123,456")]
     assert len(legend) == 8
     assert max(boxes[text].x1 for text in legend) <= right
     assert min(box.y0 for box in boxes.values()) >= 0.0
