@@ -83,14 +83,15 @@ def new_run(
     settings, folder = context.settings, context.folder
     drawn = write_drawn_pairs(settings, folder, context.progress)
     check_inputs(settings, folder)
+    # The page shows when its results were made
+    facts, seconds = facts | {"started": now()}, dict[str, float]()
     earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
-    seconds, started = dict[str, float](), now()
     with timed(seconds, "records"):
         found = find_station_jobs(context, fetched)
         head = head or asked.head(fetched, found.hashes)
     # From here on the folder describes an unfinished run
     record = facts | _all_stages(context, found, facts)
-    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
+    record |= {"seconds": seconds | record["seconds"], "drawn": drawn}
     return _finished_record(settings, folder, record, head, earlier_rows)
 
 
@@ -102,8 +103,8 @@ def new_screening(asked: RunSettings, context: RunContext) -> Result:
     check_inputs(settings, folder)
     earthquakes, known = earlier_facts(folder / RECORD)
     stations, trusted = compared_stations(found, earthquakes, settings.records)
-    earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
     started = now()
+    earlier_rows = _begun(folder, settings, SCREENING, earthquakes, {"started": started})
     # A later run does everything that has changed since, whatever is recorded here
     head = asked.head(None, {})
     head["key"] = f"screening of stations as they were at {started}"

@@ -26,7 +26,7 @@ from per_obspy.report.statements import (
     sureness,
 )
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
-from per_obspy.report.texts import LANGUAGES, counted, texts_of
+from per_obspy.report.texts import LANGUAGES, counted, texts_of, written
 from per_obspy.report.words import chance_text, length_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
@@ -167,9 +167,9 @@ def _write_legend(figure: Figure, results: Results, at: float) -> float:
     entries = list[tuple[Text, Text, int]]()
     for name, colour in class_colours(results.region.classes).items():
         if count := results.tally.classes[name]:
-            words = literal(
-                f"{shortened(class_text(name, LANGUAGES[results.language]), 24)} {count:,}"
-            )
+            label = class_text(name, LANGUAGES[results.language])
+            number = written(count, 0, results.language)
+            words = literal(f"{shortened(label, 24)} {number}")
             text = figure.text(0.0, 0.0, words, fontsize=7.5)
             width = 0.016 + text.get_window_extent().width / figure.bbox.width
             if left > MAP_LEFT and left + width > RIGHT:

@@ -171,7 +171,7 @@ def test_the_summary_of_a_run_has_its_earthquake_and_stations(done):
     text = (done["risk"] / "summary.txt").read_text()
     assert "Earthquake of 2000-01-01 00:00:00 UTC." in text
     assert "Magnitude 6.5." in text
-    assert "Stations used, 1: XX.S001." in text
+    assert "1 station expected; 1 used: XX.S001." in text
     layers = dict(pyogrio.list_layers(done["risk"] / "risk.gpkg"))
     assert {"pairs": "LineString", "stations": "Point", "areas": "MultiPolygon"}.items() <= (
         layers.items()
