@@ -333,10 +333,12 @@ def _print_counts(record: dict[str, Any]) -> None:
 
 
 def print_coverage(record: "Mapping[str, Any]") -> None:
-    """Print the rows that have a verdict, and those that are left out with their reasons."""
+    """Print the alert, and the rows that have a verdict or are left out with their reasons."""
     from per_obspy.report.coverage import coverage_sentences
     from per_obspy.results.coverage import Coverage
 
+    if record.get("alert"):
+        print(printable(record["alert"]))
     for sentence in coverage_sentences(Coverage.of_record(record)):
         print(printable(sentence))
 

@@ -66,11 +66,12 @@ WORST = 10
 
 
 class Screened(NamedTuple):
-    """Table, coverage and files of a screening by a spectrum, ``rejected.csv`` last."""
+    """Table, coverage, files (``rejected.csv`` last) and alert of a screening by a spectrum."""
 
     table: "pd.DataFrame"
     coverage: "Coverage"
     files: list[Path]
+    alert: str
 
 
 def screen(
@@ -152,18 +153,18 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)
     coverage = _coverage(settings, table)
-    files = _write_design(settings, table, coverage, output or settings.output)
+    files, alert = _write_design(settings, table, coverage, output or settings.output)
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
     for sentence in pairs.attrs["suspicions"]:
         print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
-    return Screened(table, coverage, files)
+    return Screened(table, coverage, files, alert)
 
 
 def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
     """Print the result of a screening by a spectrum, and stop without a usable pair."""
-    table, coverage, files = design
+    table, coverage, files, alert = design
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)
     rejected = len(table.attrs["rejected"])
@@ -172,7 +173,7 @@ def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
         known = {"rejected": rejected, "coverage": coverage.as_record(), "files": names}
         print(json.dumps({"pairs": len(table), **counts, **known}))
     elif not quiet:
-        print_coverage({"coverage": coverage.as_record()})
+        print_coverage({"coverage": coverage.as_record(), "alert": alert})
         _print_spectrum_result(table, counts, rejected, files)
     if table.empty:
         stop_if_nothing(0, why_nothing(files[-1]))
@@ -180,8 +181,8 @@ def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
 
 def _write_design(
     settings: "Design", table: "pd.DataFrame", coverage: "Coverage", folder: Path
-) -> list[Path]:
-    """Write the files of a screening by a design spectrum, ``rejected.csv`` last."""
+) -> tuple[list[Path], str]:
+    """Write the files of a screening by a design spectrum, ``rejected.csv`` last, and its alert."""
     from per_obspy.results.risk import write_design
     from per_obspy.runs.results.table_report import report_design
 
@@ -189,7 +190,7 @@ def _write_design(
     made = report_design(settings, table, coverage, folder)
     for fault in made.faults:
         print(f"per-obspy: {fault}", file=sys.stderr)
-    return [*files, *made.outputs, rejected]
+    return [*files, *made.outputs, rejected], made.alert
 
 
 def _coverage(settings: "Design", table: "pd.DataFrame") -> "Coverage":

@@ -1,4 +1,4 @@
-"""Overview of a region: a map of all pairs, a map of each cluster of them, gaps over demands."""
+"""Overview of a region: a map of all pairs, maps of the worst places, gaps over demands."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,30 +9,28 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import label
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
+from per_obspy.report.page.map_lines import lines_around
 from per_obspy.report.results import Region
 from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
     class_colours,
-    fit_titles,
     literal,
     save,
     title_name,
 )
+from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 IntArray = NDArray[np.int64]
-
-#: Cells along the longer side of a region; pairs in cells that touch are one cluster.
-CELLS = 24
 
 #: Smallest side of a map, m: a street with its buildings.
 SMALLEST = 200.0
@@ -92,47 +90,18 @@ def continuous(longitude: ArrayLike) -> FloatArray:
     return np.where(given < 0.0, given + 360.0, given)
 
 
-def clusters(longitude: FloatArray, latitude: FloatArray, whole: Frame) -> list[IntArray]:
-    """
-    Separate points into clusters, in the order of their first points.
+#: Worst places that have a map of their own, and the pairs that each of them has at least.
+SHOWN_PLACES, FEWEST = 3, 5
 
-    A grid of ``CELLS`` cells covers the frame; points in cells that touch belong together.
+#: Half the side of a place: a share of the map of all pairs, and at least so many m.
+SHARE, LEAST = 0.15, 2_000.0
 
-    Parameters
-    ----------
-    longitude, latitude : (n_points,) ndarray
-        Degrees, within the frame.
-    whole : Frame
-        The map.
+#: A map of at most this size, m, shows every street.
+STREETS = 5_000.0
 
-    Returns
-    -------
-    members : list of ndarray of int
-        Positions of the points of each cluster, ascending; the cluster of point 0 is the first.
-    """
-    cell = max(whole.size, SMALLEST) / CELLS / METRES_PER_DEGREE
-    column = ((longitude - whole.west) * whole.stretch / cell).astype(np.int64)
-    row = ((latitude - whole.south) / cell).astype(np.int64)
-    occupied = np.zeros((row.max(initial=0) + 1, column.max(initial=0) + 1), dtype=bool)
-    occupied[row, column] = True
-    # Cells touch by sides and corners
-    numbers, _ = label(occupied, structure=np.ones((3, 3)))
-    found = numbers[row, column]
-    order = list(dict.fromkeys(found.tolist()))
-    return [np.flatnonzero(found == number).astype(np.int64) for number in order]
-
-
-#: Clusters that have a map of their own, the worst ones.
-SHOWN_CLUSTERS = 6
-
-#: Pairs of a cluster that are hidden by each other on the map of the whole.
-FEWEST = 5
-
-#: A cluster this large relative to the whole map is visible there already.
-LARGE = 0.6
-
-#: Maps of clusters are drawn where one of them is smaller than this share of the whole map.
-SMALL = 0.15
+#: Coast lines are right to some hundred m: none on a map below this size, m.
+COARSE = 10_000.0
+COAST_COLOUR, BORDER_COLOUR = "#51708A", "#8A6F86"
 
 #: Space around the points of a map, share of its longer side.
 MARGIN = 0.06
@@ -154,7 +123,7 @@ def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
     """
     Draw maps of the pairs and stations of a region, and gaps over demands where there are any.
 
-    Towns that the map of a large region shows as dots are drawn at a scale of their own.
+    The worst places of a large region are drawn at a scale of their own.
 
     Parameters
     ----------
@@ -166,21 +135,18 @@ def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
     path : Path
         PNG file.
     """
-    points = _points(table, region)
-    found = _own_maps(points, _whole_frame(points, region))
-    rows = -(-min(len(found), SHOWN_CLUSTERS) // 3)
-    # Maps of clusters have rows of their own
-    figure = Figure(figsize=(13.0, 6.2 + 3.8 * rows), layout="constrained")
-    heights = [5.7, 3.8 * rows] if rows else [5.7]
+    places = worst_places(table, region)
+    # Their maps have a row of their own
+    heights = [5.7, 3.8] if places else [5.7]
+    figure = Figure(figsize=(13.0, 0.5 + sum(heights)), layout="constrained")
     parts = np.array(figure.subfigures(len(heights), 1, height_ratios=heights)).ravel().tolist()
     whole = _draw_top(parts[0], table, region)
-    if rows:
-        _mark(whole, [frame for frame, _ in found])
-        _draw_clusters(parts[1], table, region, points, found)
+    if places:
+        _mark(whole, [frame for frame, _ in places])
+        _draw_places(parts[1], table, region, places)
     # One legend and one title for everything
     _add_legend(figure, whole, table, region)
     figure.suptitle(title_name(region.title), parse_math=False)
-    fit_titles(figure)
     save(figure, path, region.simulated)
 
 
@@ -216,7 +182,9 @@ def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool
     frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
     _draw_stations(axes, region, frame)
-    axes.set_title(f"{len(table)} pairs shown", fontsize=11)
+    _draw_coasts(axes, points, frame)
+    _add_scale_bar(axes, frame, 0.03)
+    axes.set_title(f"{len(table):,} pairs shown", fontsize=11)
     axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)")
     # Few ticks, so that their labels never touch
     for axis in (axes.xaxis, axes.yaxis):
@@ -248,32 +216,40 @@ def _whole_frame(points: _Points, region: Region) -> Frame:
     return frame_of(continuous(longitude), latitude).padded(MARGIN)
 
 
-def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
-    """Return frames and members of clusters too small on the whole map, worst first."""
-    if not points.longitude.size:
-        return []
-    # Stations and epicentre may be far away: then one town has a map of its own too
-    pairs_frame = frame_of(points.longitude, points.latitude)
-    seen, first = whole, list[tuple[Frame, IntArray]]()
-    if pairs_frame.size < SMALL * whole.size and points.longitude.size >= FEWEST:
-        seen = pairs_frame.padded(MARGIN)
-        first = [(seen, np.arange(points.longitude.size))]
-    return _cluster_maps(points, pairs_frame, seen) or first
+def worst_places(table: pd.DataFrame, region: Region) -> list[tuple[Frame, IntArray]]:
+    """
+    Return the surroundings of the worst pairs that are too small on the map of a region.
 
+    Parameters
+    ----------
+    table, region
+        As for :func:`draw_overview`.
 
-def _cluster_maps(points: _Points, pairs_frame: Frame, seen: Frame) -> list[tuple[Frame, IntArray]]:
-    """Return frames and members of clusters too small on a map of all pairs, worst first."""
-    # A few pairs do not hide each other
-    every = clusters(points.longitude, points.latitude, pairs_frame)
-    found = [members for members in every if members.size >= FEWEST]
-    frames = [
-        frame_of(points.longitude[members], points.latitude[members]).padded(MARGIN)
-        for members in found
-    ]
-    pairs = list(zip(frames, found, strict=True))
-    if not any(frame.size < SMALL * seen.size for frame in frames):
+    Returns
+    -------
+    list of (Frame, ndarray of int)
+        Frame and positions of the pairs in each place, that of the worst pair first. Places of the
+        mildest class alone are none.
+    """
+    points = _points(table, region)
+    east, north = points.longitude, points.latitude
+    if east.size < FEWEST or _whole_frame(points, region).size < STREETS:
         return []
-    return [pair for pair in pairs if pair[0].size < LARGE * seen.size]
+    pairs = frame_of(east, north)
+    half = max(SHARE * pairs.size, LEAST) / METRES_PER_DEGREE
+    # Pairs that are not yet in a place
+    mildest = [region.classes[-1], UNKNOWN_CLASS]
+    rest, places = ~table["risk_class"].isin(mildest).to_numpy(), list[tuple[Frame, IntArray]]()
+    while rest.any() and len(places) < SHOWN_PLACES:
+        worst = int(np.argmax(rest))
+        near = np.abs(east - east[worst]) * pairs.stretch <= half
+        near &= np.abs(north - north[worst]) <= half
+        rest &= ~near
+        rest[worst] = False
+        members = np.flatnonzero(near).astype(np.int64)
+        if members.size >= FEWEST:
+            places.append((frame_of(east[members], north[members]).padded(MARGIN), members))
+    return places
 
 
 def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:
@@ -312,8 +288,8 @@ def _beside(longitude: FloatArray, middle: float) -> FloatArray:
 
 
 def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
-    """Outline the clusters with separate maps, and write their letters."""
-    for letter, frame in zip(ascii_uppercase, frames[:SHOWN_CLUSTERS], strict=False):
+    """Outline the places with separate maps, and write their letters."""
+    for letter, frame in zip(ascii_uppercase, frames, strict=False):
         width, height = frame.east - frame.west, frame.north - frame.south
         corner = frame.west, frame.south
         axes.add_patch(Rectangle(corner, width, height, fill=False, linewidth=0.8, zorder=4))
@@ -322,44 +298,48 @@ def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
         axes.annotate(letter, (frame.east, frame.north), fontweight="bold", zorder=5, **place)
 
 
-def _draw_clusters(
+def _draw_places(
     figure: SubFigure,
     table: pd.DataFrame,
     region: Region,
-    points: _Points,
-    found: Sequence[tuple[Frame, IntArray]],
+    places: Sequence[tuple[Frame, IntArray]],
 ) -> None:
-    """Draw the worst clusters, each with its number of pairs, its worst pair and a scale bar."""
-    shown = found[:SHOWN_CLUSTERS]
-    columns = min(len(shown), 3)
-    panels = figure.subplots(-(-len(shown) // columns), columns, squeeze=False).ravel()
-    # Places without a cluster stay empty
-    for panel in panels[len(shown) :]:
-        panel.set_axis_off()
-    for letter, panel, (frame, members) in zip(ascii_uppercase, panels, shown, strict=False):
+    """Draw the worst places, each with its number of pairs, its worst pair and a scale bar."""
+    points = _points(table, region)
+    panels = figure.subplots(1, len(places), squeeze=False).ravel()
+    for letter, panel, (frame, members) in zip(ascii_uppercase, panels, places, strict=False):
         _draw_points(panel, points.chosen(members), frame)
         _draw_stations(panel, region, frame)
         # Without coordinates, which the whole map has
-        _add_scale_bar(panel, frame)
+        _add_scale_bar(panel, frame, -0.03)
         worst = literal(str(table["pair_id"].iloc[int(members[0])]))[:30]
         panel.set_title(f"{letter}: {members.size} pairs, worst {worst}", fontsize=10)
         panel.set(xticks=[], yticks=[])
-    if len(found) > len(shown):
-        figure.suptitle(f"the worst {len(shown)} of {len(found)} places", fontsize=11)
 
 
-def _add_scale_bar(axes: Axes, frame: Frame) -> None:
-    """Add a bar of a round length, about a quarter of the map, below its lower edge."""
+def _draw_coasts(axes: Axes, points: _Points, frame: Frame) -> None:
+    """Draw coast lines and borders around the pairs of a large map."""
+    if frame.size < COARSE:
+        return
+    lines = lines_around(points.longitude, points.latitude)
+    for name, colour in (("coast", COAST_COLOUR), ("borders", BORDER_COLOUR)):
+        shapes = [np.reshape(line, (-1, 2)) for line in lines[name]]
+        drawn = LineCollection(shapes, colors=colour, linewidths=0.8, zorder=1)
+        axes.add_collection(drawn, autolim=False)
+
+
+def _add_scale_bar(axes: Axes, frame: Frame, height: float) -> None:
+    """Add a bar of a round length, about a quarter of the map, at a height of its axes."""
     quarter = 0.25 * frame.size
     unit = 10.0 ** np.floor(np.log10(quarter))
     length = unit * max(step for step in (1.0, 2.0, 5.0) if step * unit <= quarter)
     text = f"{length / 1000:g} km" if length >= 1000.0 else f"{length:g} m"
-    # In the coordinates of the data, below the axes: it covers no pair
+    # As long as in the coordinates of the data
     degrees = length / METRES_PER_DEGREE / frame.stretch
     place = axes.get_xaxis_transform()
-    line = [frame.west, frame.west + degrees], [-0.03, -0.03]
+    line = [frame.west, frame.west + degrees], [height, height]
     axes.plot(*line, color="black", linewidth=2.0, transform=place, clip_on=False)
-    axes.text(frame.west + 1.1 * degrees, -0.03, text, transform=place, va="center", fontsize=8)
+    axes.text(frame.west + 1.1 * degrees, height, text, transform=place, va="center", fontsize=8)
 
 
 def _add_legend(figure: Figure, axes: Axes, table: pd.DataFrame, region: Region) -> None:
@@ -368,7 +348,7 @@ def _add_legend(figure: Figure, axes: Axes, table: pd.DataFrame, region: Region)
     # Classes that a pair has
     for name, colour in class_colours(region.classes).items():
         if count := int(counts.get(name, 0)):
-            text = f"{literal(name)}: {count} pairs"
+            text = f"{literal(name)}: {count:,} pairs"
             style: dict[str, Any] = {"marker": "o", "linestyle": "", "color": colour}
             style |= {"markeredgecolor": "black", "markeredgewidth": 0.3}
             handles += axes.plot([], [], label=text, **style)

@@ -1,6 +1,7 @@
 """Figure of one pair: its record, the PER spectrum, and its energy circles at two gaps."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,15 +15,45 @@ from per_obspy.report.style import (
     BUILDING_COLOURS,
     FAINT_COLOUR,
     MOTION_COLOUR,
-    fit_titles,
     save,
     title_name,
 )
 from per_obspy.report.words import length_text, number
 from per_obspy.screening.values import components
 
+#: Why a pair is drawn that need not be the first.
+DIFFERING = "the worst pair with a record whose two circles differ"
 
-def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
+#: Circles of which one is larger than the other by less than this share look alike.
+ALIKE = 0.05
+
+
+def differing_pair(worst: pd.DataFrame) -> "pd.Series[Any] | None":
+    """
+    Return the worst pair with a record whose energy circles differ: equal ones explain nothing.
+
+    Parameters
+    ----------
+    worst : DataFrame
+        Rows of a risk table, worst first.
+
+    Returns
+    -------
+    pair : Series or None
+        The worst pair with a record where all circles are alike; None where no pair has a record.
+    """
+    if "station" not in worst:
+        return None
+    recorded = worst[worst["station"] != ""]
+    if recorded.empty:
+        return None
+    one, two = (recorded[f"participation_{i}"] * recorded[f"per_{i}"] for i in (1, 2))
+    differ = (one / two - 1.0).abs() > ALIKE
+    pair: pd.Series[Any] = (recorded[differ] if differ.any() else recorded).iloc[0]
+    return pair
+
+
+def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path, note: str = "") -> None:
     """
     Draw a record, its PER spectrum, and the energy circles of a pair in the state space.
 
@@ -34,6 +65,8 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> Non
         A row of the risk table that used this station.
     path : Path
         PNG file.
+    note : str
+        Why this pair is drawn, below the figure.
     """
     figure = Figure(figsize=(13.0, 5.0), layout="constrained")
     left, right = np.array(figure.subfigures(1, 2, width_ratios=(2.1, 1.0))).tolist()
@@ -41,8 +74,8 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> Non
     _draw_motion(motion, station, float(pair["azimuth_used"]))
     _draw_spectrum(spectrum, station, pair)
     _draw_two_gaps(right, pair, "3  ")
-    # Long names make titles wide
-    fit_titles(figure)
+    if note:
+        figure.supxlabel(note, x=0.01, ha="left", fontsize=8, color=MOTION_COLOUR)
     save(figure, path, station.attrs["simulated"] == "true")
 
 
@@ -62,7 +95,6 @@ def draw_pair_alone(pair: pd.Series, simulated: bool, path: Path) -> None:
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
     (part,) = np.array(figure.subfigures(1, 1)).ravel().tolist()
     _draw_two_gaps(part, pair, "")
-    fit_titles(figure)
     save(figure, path, simulated)
 
 
@@ -132,7 +164,9 @@ def _draw_two_gaps(figure: SubFigure, pair: pd.Series, number_text: str) -> None
     handles, labels = needs.get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=2, frameon=False)
     name = title_name(str(pair["pair_id"]))
-    figure.suptitle(f"{number_text}pair {name}", fontsize=11, parse_math=False)
+    rank = number(pair, "rank")
+    place = f", rank {rank:.0f}" if np.isfinite(rank) else ""
+    figure.suptitle(f"{number_text}pair {name}{place}", fontsize=11, parse_math=False)
 
 
 def _draw_circles(axes: Axes, pair: pd.Series, apart: float, widest: float) -> None:

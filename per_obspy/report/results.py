@@ -1,13 +1,11 @@
 """Results of a run, a design spectrum or an ensemble, as every report reads them."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-from per_obspy.report.page.texts import Language
 from per_obspy.report.tally import PairTally
 from per_obspy.results.coverage import Coverage
 
@@ -37,33 +35,22 @@ class Region(NamedTuple):
     epicentre: tuple[float, float] | None = None
 
 
-class Event(NamedTuple):
+class Revision(NamedTuple):
     """
-    Earthquake of a screening, as far as files and records know it.
+    Revision of the results of a watched earthquake.
 
     Attributes
     ----------
-    start, time : str
-        First sample of the first record, and origin time, UTC; empty if unknown.
-    magnitude : float
-        NaN if unknown.
-    place : tuple of float or None
-        Longitude and latitude of the hypocentre, degrees, and its depth, m.
-    source : str
-        Sentences on a spectrum or on scenarios in place of an earthquake; empty if there is one.
-    revision : int
-        Number of the revision of these results; 0 if they have none.
-    revised, event_id : str
-        Time of that revision, UTC, and identifier of the earthquake; empty if unknown.
+    number : int
+        0 if the run is none.
+    time : str
+        When the results were made, UTC; empty where unknown.
+    event_id : str
+        Identifier of the earthquake in its list; empty where unknown.
     """
 
-    start: str = ""
+    number: int = 0
     time: str = ""
-    magnitude: float = math.nan
-    place: tuple[float, float, float] | None = None
-    source: str = ""
-    revision: int = 0
-    revised: str = ""
     event_id: str = ""
 
 
@@ -103,10 +90,10 @@ class Results:
         Title, classes, stations and epicentre.
     coverage : Coverage
         Rows of the pair tables, and those that are left out.
-    language : {'en', 'es'}
+    language : str
         Of page and summary.
-    event : Event
-        The earthquake.
+    revision : Revision
+        Number and time of the results.
     source : sequence of str
         Sentences on the earthquake, the spectrum or the scenarios.
     tally : PairTally
@@ -139,13 +126,15 @@ class Results:
         Titles and texts on where the results come from.
     own : sequence of str
         Columns of pairs that are computed, besides those of every risk table.
+    class_limits : mapping of str to float
+        Smallest expected impact velocity of each class, m/s.
     """
 
     stem: str
     region: Region
     coverage: Coverage
-    language: Language = "en"
-    event: Event = field(default_factory=Event)
+    language: str = "en"
+    revision: Revision = field(default_factory=Revision)
     source: Sequence[str] = ()
     tally: PairTally = field(default_factory=lambda: PairTally(()))
     worst: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -162,3 +151,4 @@ class Results:
     drawings: Drawings = field(default_factory=Drawings)
     provenance: Sequence[tuple[str, str]] = ()
     own: Sequence[str] = ()
+    class_limits: Mapping[str, float] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY, UNSET_DAYS
-from per_obspy.report.style import MOTION_COLOUR, fit_titles, literal, save, title_name
+from per_obspy.report.style import MOTION_COLOUR, literal, save, title_name
 from per_obspy.spectra.bilinear import bilinear_response
 
 #: Colours of components, in their order (Okabe & Ito 2008).
@@ -58,7 +58,6 @@ def _write_title(figure: Figure, station: xr.Dataset, chosen: xr.Dataset) -> Non
     facts = f"damping {float(chosen['damping']):.0%}, usable periods only"
     name = title_name(str(station["station"].item()))
     figure.suptitle(f"{name}, {record_date(station)}\n{facts}", parse_math=False)
-    fit_titles(figure)
 
 
 def record_date(station: xr.Dataset) -> str:
@@ -121,7 +120,6 @@ def draw_state_space(station: xr.Dataset, period: float, damping: float, path: P
     title = f"{title_name(name)}, {record_date(station)}\nT = {period:g} s, ξ = {damping:g}"
     axes.set_title(title, fontsize=11, parse_math=False)
     axes.legend(fontsize=9, loc="upper right")
-    fit_titles(figure)
     save(figure, path, station.attrs["simulated"] == "true")
 
 

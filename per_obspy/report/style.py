@@ -93,9 +93,8 @@ def literal(text: str) -> str:
     return printable(text).replace("$", r"\$")
 
 
-def fit_titles(figure: Figure) -> None:
+def _fit_titles(figure: Figure) -> None:
     """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
-    figure.draw_without_rendering()
     titles = [(axes.title, axes.bbox.width) for axes in figure.axes]
     # Titles of the whole figure and of its parts
     parts: list[Figure | SubFigure] = [figure, *figure.subfigs]
@@ -134,5 +133,11 @@ def save(figure: Figure, path: Path, simulated: bool) -> None:
             fontsize=9,
             color="#AA0000",
         )
+    # Axes are arranged once, not once for the titles and again for the file
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    _fit_titles(figure)
     with written_whole(path) as part:
         figure.savefig(part, dpi=DOTS_PER_INCH)

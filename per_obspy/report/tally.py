@@ -86,11 +86,19 @@ def _codes(column: pd.Series, names: Sequence[str]) -> NDArray[np.int64]:
 #: Pairs that the page holds one by one, the worst; the others are counted in cells.
 PAGE_PAIRS = 20_000
 
+#: Expected impact velocity from which a pair counts as hit hard, m/s. Reasoned, not verified: a
+#: plane wave of two concrete slabs has 0.8 MPa, see docs/population.md.
+HARD = 0.2
+
 #: Columns of the risk table that are counted; a table may lack some.
 COUNTED = (
-    "rank", "state", "risk_class", "probability", "flags", "derived", "distance", "longitude",
-    "latitude",
+    "rank", "state", "risk_class", "probability", "expected_impact_velocity", "flags", "derived",
+    "distance", "longitude", "latitude", "yield_displacement_1", "yield_displacement_2",
 )  # fmt: skip
+
+
+#: Yield displacements of both buildings, infinite where they are elastic.
+YIELDS = ("yield_displacement_1", "yield_displacement_2")
 
 
 class PairTally:
@@ -103,12 +111,22 @@ class PairTally:
     ----------
     classes : sequence of str
         Names of the risk classes, worst first.
+
+    Attributes
+    ----------
+    expected, hard, columns : float
+        Expected numbers of pairs that hit each other, of those that hit hard, and of those among
+        them whose floors meet columns: sums of probabilities.
+    yielding : int
+        Pairs of which a building yields in the model.
     """
 
     def __init__(self, classes: Sequence[str]) -> None:
         """Begin without a pair."""
         self.pairs = 0
-        self.expected = 0.0
+        self.expected = self.hard = self.columns = 0.0
+        self.yielding = 0
+        self.expected_by_class: Counter[str] = Counter()
         self.derived = 0
         self.states: Counter[str] = Counter()
         self.classes: Counter[str] = Counter()
@@ -128,12 +146,27 @@ class PairTally:
         derived = _counts(piece, "derived")
         self.derived += sum(derived.values()) - derived.get("", 0)
         if "probability" in piece:
-            self.expected += float(np.nansum(piece["probability"]))
+            self._add_expected(piece)
+        limits = [name for name in YIELDS if name in piece]
+        self.yielding += int(np.isfinite(piece[limits].astype(float)).any(axis=1).sum())
         if "distance" in piece:
             self._distances.append(piece["distance"].dropna().copy())
         others = piece[piece["rank"] > PAGE_PAIRS]
         if len(others) and {"longitude", "latitude", "risk_class", "state"} <= set(piece):
             self.cells.add(others)
+
+    def _add_expected(self, piece: pd.DataFrame) -> None:
+        """Add the probabilities of a piece: of all, by class, and of hard impacts."""
+        chance = piece["probability"].fillna(0.0)
+        self.expected += float(chance.sum())
+        if "risk_class" in piece:
+            sums = chance.groupby(piece["risk_class"].to_numpy(), observed=True).sum()
+            self.expected_by_class.update(dict(sums))
+        if "expected_impact_velocity" in piece:
+            chance = chance[piece["expected_impact_velocity"] >= HARD]
+            self.hard += float(chance.sum())
+            flags = piece.get("flags", pd.Series("", piece.index)).loc[chance.index]
+            self.columns += float(chance[flags.str.contains("floor_to_column", na=False)].sum())
 
     def median_distance(self) -> float:
         """Return the median distance between pair and station, m; NaN if no pair has one."""

@@ -6,6 +6,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
+from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
@@ -59,36 +60,38 @@ def length_text(metres: float) -> str:
     return f"{100 * metres:.3g} cm" if centimetres else f"{1000 * metres:.2g} mm"
 
 
-def speed_text(metres_per_second: float) -> str:
+def speed_text(metres_per_second: float, language: str = "en") -> str:
     """
-    Return a velocity in cm/s with two digits; ``unknown`` for NaN.
+    Return a velocity in m/s with two digits; in words if it is unknown.
 
     Examples
     --------
-    >>> speed_text(0.2154), speed_text(0.0), speed_text(0.0004), speed_text(1.234)
-    ('22 cm/s', '0 cm/s', '0.04 cm/s', '120 cm/s')
+    >>> speed_text(0.2154), speed_text(0.0), speed_text(0.0004), speed_text(1.234, "es")
+    ('0.22 m/s', '0 m/s', '0.0004 m/s', '1,2 m/s')
     """
     if not math.isfinite(metres_per_second):
-        return "unknown"
-    return f"{float(f'{100 * metres_per_second:.2g}'):g} cm/s"
+        return LANGUAGES[language]["unknown"]
+    text = f"{float(f'{metres_per_second:.2g}'):f}".rstrip("0").rstrip(".")
+    return f"{text.translate(marks(language))} m/s"
 
 
-def chance_text(probability: float) -> str:
+def chance_text(probability: float, language: str = "en") -> str:
     """
     Return a probability as a number of cases in 100; 0 and 100 only if exact.
 
     Examples
     --------
-    >>> chance_text(1.0), chance_text(0.999), chance_text(0.004), chance_text(0.0)
-    ('100 of 100', 'over 99 of 100', 'under 1 of 100', '0 of 100')
+    >>> chance_text(1.0), chance_text(0.999), chance_text(0.004), chance_text(0.0, "es")
+    ('100 of 100', 'over 99 of 100', 'under 1 of 100', '0 de 100')
     """
+    texts = LANGUAGES[language]
     if not math.isfinite(probability):
-        return "unknown"
+        return texts["unknown"]
     if 0.0 < probability < 0.005:
-        return "under 1 of 100"
+        return texts["chance_under"]
     if 0.995 <= probability < 1.0:
-        return "over 99 of 100"
-    return f"{100 * probability:.0f} of 100"
+        return texts["chance_over"]
+    return texts["chance"].format(value=f"{100 * probability:.0f}")
 
 
 def pair_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -283,6 +283,7 @@ def _joined(
         "counts": counts,
         "coverage": coverage.as_record(),
         "faults": made.faults,
+        "alert": made.alert,
         "outputs": file_hashes(folder, [*files, *made.outputs]),
         "versions": software_versions(),
     }

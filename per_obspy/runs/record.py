@@ -39,6 +39,8 @@ class RunRecord:
         Stations, pairs, states, rejections, chunks and rows.
     faults : list of str
         Figures and layers that could not be made.
+    alert : str
+        Level and sentence of the result.
     engine : dict
         Workers and events of a cluster.
     simulated : bool
@@ -81,6 +83,7 @@ class RunRecord:
     failed: bool | None = None
     counts: Mapping[str, int] | None = None
     faults: Sequence[str] | None = None
+    alert: str | None = None
     engine: Mapping[str, Any] | None = None
     simulated: bool | None = None
     warnings: Mapping[str, Sequence[str]] | None = None

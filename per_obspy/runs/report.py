@@ -13,14 +13,12 @@ import xarray as xr
 from per_obspy.config import Run
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.page.document import write_page
-from per_obspy.report.page.first_screen import revision_line
 from per_obspy.report.page.packing import MOST_COLUMNS
-from per_obspy.report.page.texts import LANGUAGES
-from per_obspy.report.pair_figure import draw_record_to_pair
-from per_obspy.report.results import Event, Region, Results
-from per_obspy.report.summary.statements import event_sentences, station_sentences
-from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
+from per_obspy.report.results import Region, Results
+from per_obspy.report.statements import event_sentences
 from per_obspy.report.tally import PAGE_PAIRS
+from per_obspy.report.texts import LANGUAGES
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
 from per_obspy.runs.provenance import RunContext
@@ -100,7 +98,7 @@ def run_region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Re
 
 def _epicentre(known: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return longitude and latitude of an epicentre, None if unknown."""
-    longitude, latitude, _ = _coordinates(known, "")
+    longitude, latitude = _number(known.get("longitude")), _number(known.get("latitude"))
     is_known = math.isfinite(longitude) and math.isfinite(latitude)
     return (longitude, latitude) if is_known else None
 
@@ -118,13 +116,19 @@ def _report_pairs(
     outlines = outlines_beside(
         settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
     )
-    results = _described(settings, folder, stations, coverage, region, known)
-    results, reader, worst = _with_pairs(settings, folder, results, outlines, report)
+    language, revision = settings.report.language, revision_of_run(folder / "run.json")
+    number = settings.report.revision or revision.number
+    results = Results(
+        "risk", region, coverage, language, revision._replace(number=number),
+        event_sentences(known, language), stations=read_stations(folder / "stations.csv"),
+        provenance=_provenance(settings), class_limits=settings.screening.classes,
+    )  # fmt: skip
+    results, reader = _with_pairs(settings, folder, results, outlines, report)
     # Totals, layers and the comparison with observations need no record
     report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
     write_files(results, folder, settings.spreadsheet, report)
     write_overview(results, folder, report)
-    _draw_worst_pair(worst, stations, folder, report)
+    _draw_worst_pair(differing_pair(results.worst), stations, folder, report)
     with report.tried(folder / "report.html"):
         page = with_page_data(results, folder, outlines)
         drawings = page_drawings(settings, results.worst, stations)
@@ -134,8 +138,8 @@ def _report_pairs(
 
 def _with_pairs(
     settings: Run, folder: Path, results: Results, outlines: Path | None, report: Report
-) -> tuple[Results, TableReader, "pd.Series[Any] | None"]:
-    """Return the results with their pairs, what was read of all, and the worst with a record."""
+) -> tuple[Results, TableReader]:
+    """Return the results with their pairs, and what was read of all."""
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else needed_columns(settings.totals)
     with ranked_table(table_files(folder), columns) as table:
@@ -145,27 +149,7 @@ def _with_pairs(
         results = read_table(
             results, reader, table.pieces(), folder, outlines, settings.geopackage, report
         )
-        return results, reader, table.row(reader.recorded) if reader.recorded else None
-
-
-def _described(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    coverage: Coverage,
-    region: Region,
-    known: Mapping[str, Any],
-) -> Results:
-    """Return the results of a run but for its table of pairs."""
-    table, language = read_stations(folder / "stations.csv"), settings.report.language
-    event = _event(settings, folder, stations, table, known)
-    # Which result this is comes first, then the earthquake
-    line = revision_line(event.revision, event.revised, event.event_id, language)
-    source = [*([f"{line}."] if line else []), *event_sentences(known, language)]
-    return Results(
-        "risk", region, coverage, language, event, source,
-        stations=table, provenance=_provenance(settings),
-    )  # fmt: skip
+        return results, reader
 
 
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
@@ -183,7 +167,7 @@ def _draw_worst_pair(
     folder: Path,
     report: Report,
 ) -> None:
-    """Draw the worst pair that has a record, from record to pounding; nothing without one."""
+    """Draw a pair from its record to pounding; nothing where no pair has a record."""
     if worst is None:
         return
     # Only here a station's motion is needed again
@@ -192,54 +176,7 @@ def _draw_worst_pair(
     assert station.shard is not None  # chosen so
     motion = read_station_once(station.shard, station.hash)
     with report.tried(walk):
-        draw_record_to_pair(motion, worst, walk)
-
-
-def _event(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    table: pd.DataFrame,
-    known: Mapping[str, Any],
-) -> Event:
-    """Return the earthquake, as far as its file and the spectra of the stations know it."""
-    facts = [station.spectra.attrs for station in stations if station.spectra is not None]
-    # Undated records begin in 1970
-    starts = [str(one.get("time_coverage_start", "1970")) for one in facts]
-    start = min((time for time in starts if time >= "1971"), default="")
-    revision, language = revision_of_run(folder / "run.json"), settings.report.language
-    # A ShakeMap is named in sentences of its own
-    source = [*event_sentences(known, language), *station_sentences(table, language)]
-    return Event(
-        start=start[:19].replace("T", " "),
-        time=str(known.get("time") or "")[:19].replace("T", " "),
-        magnitude=_number(known.get("magnitude")),
-        place=_place(facts, known),
-        source=" ".join(source) if known.get("map") else "",
-        revision=settings.report.revision or revision.number,
-        revised=revision.time,
-        event_id=revision.event_id,
-    )
-
-
-def _place(
-    facts: Sequence[Mapping[str, Any]], known: Mapping[str, Any]
-) -> tuple[float, float, float] | None:
-    """Return longitude, latitude and depth of the hypocentre, None if it is unknown."""
-    places = [_coordinates(one, "hypocentre_") for one in facts]
-    for place in (*places, _coordinates(known, "")):
-        # The depth may be unknown
-        if np.isfinite(place[:2]).all():
-            return place
-    return None
-
-
-def _coordinates(facts: Mapping[str, Any], prefix: str) -> tuple[float, float, float]:
-    """Return longitude, latitude and depth of keys with a prefix, NaN where missing."""
-    longitude, latitude, depth = (
-        _number(facts.get(f"{prefix}{axis}")) for axis in ("longitude", "latitude", "depth")
-    )
-    return longitude, latitude, depth
+        draw_record_to_pair(motion, worst, walk, DIFFERING)
 
 
 def _number(value: Any) -> float:
@@ -259,5 +196,5 @@ def _provenance(settings: Run) -> list[tuple[str, str]]:
         made_with(language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
-        *content_note([WORDING[language]["page_shakemap"]] if has_map else [], language),
+        *content_note([LANGUAGES[language]["page_shakemap"]] if has_map else [], language),
     ]

@@ -123,7 +123,7 @@ def new_report(context: RunContext, record: dict[str, Any]) -> Result:
     outputs = record["outputs"] | file_hashes(folder, made.outputs)
     # A picture or layer that failed is made by the next run
     key = "" if made.faults else record["key"]
-    found = {"outputs": outputs, "faults": made.faults, "key": key}
+    found = {"outputs": outputs, "faults": made.faults, "alert": made.alert, "key": key}
     return recorded(folder / RECORD, {**record, **found})
 
 
@@ -179,6 +179,7 @@ def _later_stages(
         # A picture or layer that failed is made by the next run
         failed=record.failed or bool(report.faults),
         faults=report.faults,
+        alert=report.alert,
         engine=engine_facts(executor),
         simulated=simulated_motion(settings, usable),
         warnings=table.warnings,

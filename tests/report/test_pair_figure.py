@@ -11,7 +11,12 @@ from matplotlib.image import imread
 from numpy.testing import assert_allclose
 from screening_samples import make_station
 
-from per_obspy.report.pair_figure import draw_pair_alone, draw_record_to_pair, motion_along
+from per_obspy.report.pair_figure import (
+    differing_pair,
+    draw_pair_alone,
+    draw_record_to_pair,
+    motion_along,
+)
 
 PAIR = {
     "pair_id": "P7",
@@ -156,3 +161,14 @@ def test_neighbouring_titles_do_not_overlap(station, drawn):
     panels = _panels(station, drawn, pair_id="W" * 300)
     boxes = [axes.title.get_window_extent() for axes in panels[:3]]
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
+
+
+def test_two_equal_circles_are_not_drawn_where_other_pairs_differ():
+    """A pair of twins comes first in the ranking, and explains nothing."""
+    alike = PAIR | {"station": "XX.ONE", "participation_2": 2.4}
+    pairs = pd.DataFrame([alike | {"station": ""}, alike, PAIR | {"station": "XX.ONE"}])
+    pairs["pair_id"] = ["map", "twins", "different"]
+    assert differing_pair(pairs)["pair_id"] == "different"
+    assert differing_pair(pairs.iloc[:2])["pair_id"] == "twins"
+    assert differing_pair(pairs.iloc[:1]) is None
+    assert differing_pair(pd.DataFrame()) is None

@@ -14,6 +14,7 @@ from pyarrow import parquet
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
 from per_obspy.report.results import Results
+from per_obspy.report.tally import HARD
 from per_obspy.results import ranked_table
 from per_obspy.results.coverage import Coverage
 from per_obspy.runs.report import _with_pairs, run_region
@@ -66,7 +67,7 @@ def test_a_report_needs_a_finished_run(copied):
 
 
 def read(folder):
-    """Return the results, what was read of all rows, and the worst pair with a record."""
+    """Return the results, and what was read of all rows."""
     settings, out = load(folder / "run.toml", Run), folder / "out"
     results = Results("risk", run_region(settings, True, None), Coverage(60, 60))
     return _with_pairs(settings, out, results, None, Report([], []))
@@ -74,13 +75,16 @@ def read(folder):
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
-    # would catch rows lost between pieces, and a worst pair of a later piece
+    # would catch rows lost between pieces
     monkeypatch.setattr(ranked_table, "ROWS", size)
-    results, reader, worst = read(copied)
+    results, reader = read(copied)
     table = pd.read_parquet(copied / "out" / "risk.parquet")
-    named = table[table["station"] != ""].iloc[0]
-    assert worst["pair_id"] == named["pair_id"]
-    assert worst.index.tolist() == table.columns.tolist()
+    # The alert is that of all rows
+    hard = table["expected_impact_velocity"] >= HARD
+    assert results.tally.expected == pytest.approx(table["probability"].sum())
+    assert results.tally.hard == pytest.approx(table.loc[hard, "probability"].sum())
+    by_class = table.groupby("risk_class")["probability"].sum()
+    assert dict(results.tally.expected_by_class) == pytest.approx(by_class.to_dict())
     # every pair of a small table is shown, and every observed one counts
     pd.testing.assert_frame_equal(results.shown, table[report_files.SHOWN_COLUMNS])
     observed = table.loc[table["observed"].notna(), report_files.OBSERVED_COLUMNS]

@@ -367,7 +367,7 @@ def test_only_what_changes_is_computed(city, server, simulation, monkeypatch):
     for number, name in enumerate(city.revisions()[:2], start=1):
         folder = city.event() / "revisions" / name
         text = " ".join((folder / "summary.txt").read_text().split())
-        assert f"xx1: Revision {number}, 00:0{number * 3}" in text
+        assert f"xx1: Revision {number}, 2000-01-01 00:0{number * 3}" in text
         assert "Earthquake of 2000-01-01 00:00:00 UTC. Magnitude 6.5. Epicentre 0.000" in text
         assert page_content(folder / "report.html")["revision"].startswith(
             f"xx1: Revision {number}, "

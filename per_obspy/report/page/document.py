@@ -5,17 +5,16 @@ import math
 import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
-from per_obspy.report.coverage import coverage_number, coverage_sentences
-from per_obspy.report.page.first_screen import first_screen
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.page.packing import (
     FRACTION_BITS,
     LONGEST_TEXT,
@@ -26,10 +25,19 @@ from per_obspy.report.page.packing import (
     pack_table,
     text_kind,
 )
-from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases, written
 from per_obspy.report.results import Results
-from per_obspy.report.style import BUILDING_COLOURS, class_colours
+from per_obspy.report.statements import (
+    alert,
+    class_text,
+    first_steps,
+    key_numbers,
+    revision_line,
+    station_sentences,
+    sureness,
+)
+from per_obspy.report.style import BUILDING_COLOURS, UNKNOWN_COLOUR, class_colours
 from per_obspy.report.tally import PairTally
+from per_obspy.report.texts import LANGUAGES, counted, fixed_phrases, texts_of, written
 from per_obspy.report.words import missing_gap, prevention_kind
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
@@ -56,8 +64,17 @@ PAIR_KINDS = {
 #: Largest and smallest probability below 1 and above 0 that single precision keeps apart from them.
 NEARLY_NEVER, NEARLY_SURE = 1e-30, 1.0 - 2.0**-FRACTION_BITS
 
+#: Pairs with a verdict, and those without one, in the bar of the coverage.
+SCREENED_COLOUR, LEFT_OUT_COLOUR = "#7A8B99", "#1B1B1B"
+
+#: Longest text on the earthquake, or on what stands in its place, characters.
+LONGEST_SOURCE = 500
+
 #: Kinds of texts that the script never shows by their keys.
-HIDDEN = ("flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_")
+HIDDEN = (
+    "flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_", "alert_",
+    "page_", "map_title", "coverage_some", "coverage_search",
+)  # fmt: skip
 
 #: Columns of a building on the page, and their kinds.
 BUILDING_KINDS = {
@@ -87,21 +104,25 @@ LONGEST_CELL = 300
 def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, with descriptions of its tables, and the tables."""
     # Sentences first, then whatever the script draws
-    screen = first_screen(results)
-    # What has a verdict, of all that should have one, is the first number
-    whole = partial(written, digits=0, language=results.language)
-    screen.numbers.insert(0, coverage_number(results.coverage, results.language, whole))
-    texts, tables = LANGUAGES[results.language], _tables(results)
+    language, revision = results.language, results.revision
+    texts, tables = texts_of(language, results.stem), _tables(results)
     content = {
-        "language": results.language,
-        "texts": _texts(texts, results.stem),
+        "language": language,
+        "texts": {key: text for key, text in texts.items() if not key.startswith(HIDDEN)},
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
         "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
         "title": shortened(results.region.title, LONGEST_CELL),
         "simulated": results.region.simulated,
-        "coverage": coverage_sentences(results.coverage, results.language),
+        "alert": alert(results)._asdict(),
+        "coverage": _coverage(results),
+        "coverage_bar": _coverage_bar(results, texts),
         "warns": results.coverage.lacks_many,
-        **screen._asdict(),
+        "event": shortened(" ".join(results.source), LONGEST_SOURCE),
+        "revision": revision_line(revision, language),
+        "expected": " ".join(station_sentences(results.stations, language)),
+        "numbers": key_numbers(results),
+        "first": first_steps(results),
+        "sure": sureness(results),
         "states": _states(results.tally, texts),
         "classes": _classes(results, texts),
         "pair_count": results.tally.pairs,
@@ -112,12 +133,22 @@ def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
     return content, tables
 
 
-def _texts(texts: Mapping[str, str], stem: str) -> dict[str, str]:
-    """Return the texts of the script; those of this kind of results replace the general ones."""
-    shown = {key: text for key, text in texts.items() if not key.startswith(HIDDEN)}
-    ending = f"_{stem}"
-    own = {key.removesuffix(ending): shown[key] for key in shown if key.endswith(ending)}
-    return shown | own
+def _coverage(results: Results) -> list[str]:
+    """Return the coverage in sentences, none where the bar says all of it."""
+    coverage = results.coverage
+    is_whole = coverage.pairs == coverage.screened and not coverage.search
+    return [] if is_whole else coverage_sentences(coverage, results.language)
+
+
+def _coverage_bar(results: Results, texts: Mapping[str, str]) -> list[list[Any]]:
+    """Return label, number and colour of the rows with a verdict, an unknown gap, or neither."""
+    coverage, unknown = results.coverage, results.tally.states["unknown"]
+    parts = (
+        ("screened", coverage.screened - unknown, SCREENED_COLOUR),
+        ("unknown", unknown, UNKNOWN_COLOUR),
+        ("left_out", coverage.pairs - coverage.screened, LEFT_OUT_COLOUR),
+    )
+    return [[texts[f"coverage_{name}"], count, colour] for name, count, colour in parts]
 
 
 def _drawn(results: Results) -> dict[str, Any]:
@@ -126,7 +157,7 @@ def _drawn(results: Results) -> dict[str, Any]:
     return {
         "building_colours": BUILDING_COLOURS,
         "cell_size": results.tally.cells.size,
-        "epicentre": list(results.event.place[:2]) if results.event.place else None,
+        "epicentre": list(results.region.epicentre) if results.region.epicentre else None,
         **results.lines,
         # Names as they are packed, by which the script finds the pairs of an outline
         "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in results.outlines],
@@ -197,7 +228,7 @@ def _classes(results: Results, texts: Mapping[str, str]) -> list[dict[str, Any]]
     return [
         {
             "name": name,
-            "label": texts.get(f"class_{name}", shortened(name, 40)),
+            "label": class_text(name, texts),
             "colour": colour,
             "weight": 4.0 * max(1.0 - number / max(len(colours) - 2, 1), 0.0),
             "count": results.tally.classes[name],
@@ -208,18 +239,18 @@ def _classes(results: Results, texts: Mapping[str, str]) -> list[dict[str, Any]]
 
 def _further_tables(results: Results, texts: Mapping[str, str]) -> dict[str, Any]:
     """Return stations, areas, rejections and provenance."""
-    areas, note = results.areas, texts["rejected_none"]
+    areas, note, language = results.areas, texts["rejected_none"], results.language
     if "expected_pounding" in areas:
         areas = areas.sort_values("expected_pounding", ascending=False)
     if results.rejections:
         shown = min(results.rejections, MOST_ROWS)
-        key = "rejected_some_one" if results.rejections == 1 else "rejected_some"
-        note = texts[key].format(shown=shown, all=results.rejections)
+        shown, count = (written(number, 0, language) for number in (shown, results.rejections))
+        note = counted(language, "rejected_some", results.rejections, shown=shown, all=count)
     elif results.coverage.pairs > results.coverage.screened:
         # What the search for pairs left out is in no table of this run
-        note = " ".join(coverage_sentences(results.coverage, results.language))
+        note = " ".join(coverage_sentences(results.coverage, language))
     # Stations are on the map too
-    stations = _rows(_described(results.stations, results.language), STATION_COLUMNS, texts)
+    stations = _rows(_described(results.stations, language), STATION_COLUMNS, texts)
     return {
         "stations": {**stations, "places": _station_places(results.stations)},
         "areas": _rows(areas, AREA_COLUMNS, texts),
@@ -239,8 +270,8 @@ def _reasons(results: Results, texts: Mapping[str, str]) -> pd.DataFrame:
     return results.rejected.assign(kind=kinds, reasons=reasons)
 
 
-def _described(stations: pd.DataFrame, language: Language) -> pd.DataFrame:
-    """Return stations with their states in words, and reasons of rejection with the warnings."""
+def _described(stations: pd.DataFrame, language: str) -> pd.DataFrame:
+    """Return stations with states in words, PGA in g, and reasons of rejection with warnings."""
     texts = LANGUAGES[language]
     if not {"state", "warnings", "rejected"} <= set(stations):
         return stations
@@ -249,11 +280,12 @@ def _described(stations: pd.DataFrame, language: Language) -> pd.DataFrame:
     both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
     state = stations["state"].map(named).fillna("")
     sentences = [fixed_phrases(text, language) for text in both.str.strip()]
-    return stations.assign(state=state, warnings=sentences)
+    in_g = {"pga": stations["pga"] / STANDARD_GRAVITY} if "pga" in stations else {}
+    return stations.assign(state=state, warnings=sentences, **in_g)
 
 
 def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
-    """Return name, longitude, latitude of every station with a place, and whether it is used."""
+    """Return name, place and PGA (g) of every station with a place, and whether it is used."""
     if not {"longitude", "latitude"} <= set(stations):
         return []
     placed = stations[stations["longitude"].notna() & stations["latitude"].notna()]
@@ -263,6 +295,7 @@ def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
             float(row["longitude"]),
             float(row["latitude"]),
             row["state"] == "used",
+            _cell(row.get("pga", math.nan) / STANDARD_GRAVITY),
         ]
         for _, row in placed.iterrows()
     ]

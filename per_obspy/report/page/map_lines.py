@@ -68,10 +68,10 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
     stride = 1 + int(near.sum()) // MOST_CORNERS
     # Line by line, with its index of the first corner
     starts = np.concatenate([[0], world.ends[:-1]])
-    for start, end, border in zip(starts, world.ends, world.is_border, strict=True):
-        if near[start:end].any():
-            pieces = _pieces(world.corners[start:end], near[start:end], stride)
-            found["borders" if border else "coast"] += pieces
+    for line in np.flatnonzero(np.add.reduceat(near, starts, dtype=np.int64)):
+        part = slice(starts[line], world.ends[line])
+        kind = "borders" if world.is_border[line] else "coast"
+        found[kind] += _pieces(world.corners[part], near[part], stride)
     return found
 
 

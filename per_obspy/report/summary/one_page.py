@@ -6,6 +6,7 @@ from textwrap import wrap
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from per_obspy.errors import shortened
@@ -13,16 +14,19 @@ from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.overview import draw_map
 from per_obspy.report.results import Results
-from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
-from per_obspy.report.summary.statements import (
+from per_obspy.report.statements import (
     LISTED,
+    Alert,
+    alert,
+    class_text,
     first_steps,
-    five_numbers,
     made_sentence,
+    revision_line,
     station_sentences,
     sureness,
 )
-from per_obspy.report.summary.wording import WORDING, in_language
+from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
+from per_obspy.report.texts import LANGUAGES, counted, texts_of, written
 from per_obspy.report.words import chance_text, length_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
@@ -62,11 +66,10 @@ def write_page(results: Results, path: Path) -> None:
     """
     figure = Figure(figsize=PAGE)
     at = _write_head(figure, results)
-    at = _write_numbers(figure, results, at)
     bottom = at - 0.30
     _draw_map(figure, results, bottom)
-    texts = WORDING[results.language]
-    lowest = _write_section(figure, texts["what_first"], first_steps(results), at, HALF)
+    texts = texts_of(results.language, results.stem)
+    lowest = _write_section(figure, texts["do_first"], first_steps(results), at, HALF)
     lowest = _write_section(figure, texts["how_sure"], sureness(results), lowest, HALF)
     _write_pairs(figure, results, min(lowest, bottom))
     # Where the numbers are from
@@ -82,10 +85,10 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     """Draw the map of the pairs on the right, with its legend."""
     legend = _write_legend(figure, results, bottom + 0.005)
     box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
-    axes, texts = figure.add_axes(box), WORDING[results.language]
+    axes, texts = figure.add_axes(box), LANGUAGES[results.language]
     draw_map(axes, results.shown, results.region, around_pairs=True)
     # Labels in the language of the summary
-    axes.set_title(texts["map_title"].format(count=len(results.shown)))
+    axes.set_title(counted(results.language, "map_title", len(results.shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
     axes.tick_params(labelsize=7)
     for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
@@ -93,7 +96,7 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
 
 
 def _write_head(figure: Figure, results: Results) -> float:
-    """Write title, warning, earthquake and stations; return how far the page is filled."""
+    """Write title, warning, alert, earthquake and stations; return how far the page is filled."""
     at = 0.955
     for line in wrap(shortened(results.region.title, 140), 70):
         figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
@@ -102,12 +105,13 @@ def _write_head(figure: Figure, results: Results) -> float:
         figure.text(
             LEFT,
             at,
-            WORDING[results.language]["simulated"],
+            LANGUAGES[results.language]["simulated"],
             fontsize=12,
             color=WARNING_COLOUR,
             fontweight="bold",
         )
-        at -= 0.022
+        at -= 0.024
+    at = _write_alert(figure, alert(results), at)
     # Whatever has no verdict comes first
     for place, sentence in enumerate(coverage_sentences(results.coverage, results.language)):
         warns = place == 0 and results.coverage.lacks_many
@@ -115,29 +119,33 @@ def _write_head(figure: Figure, results: Results) -> float:
         at = _write_lines(figure, lines, at, WARNING_COLOUR if warns else "black")
     # Sentences one after the other
     stations = station_sentences(results.stations, results.language)
-    for text in (" ".join(results.source), " ".join(stations)):
+    line = revision_line(results.revision, results.language)
+    for text in (line, " ".join(results.source), " ".join(stations)):
         at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
     return at - 0.01
 
 
-def _write_lines(figure: Figure, lines: list[str], at: float, colour: str = "black") -> float:
+def _write_alert(figure: Figure, alert: Alert, at: float) -> float:
+    """Write the alert beside a band of its colour; return how far the page is filled."""
+    lines, top = wrap(f"{alert.level.upper()}. {alert.sentence}", 72), at + 0.01
+    for line in lines:
+        figure.text(LEFT + 0.025, at, literal(line), fontsize=11.5, fontweight="bold")
+        at -= 0.018
+    band = Rectangle((LEFT, at + 0.008), 0.014, top - at, transform=figure.transFigure)
+    band.set(facecolor=alert.colour, edgecolor="none")
+    figure.add_artist(band)
+    small = wrap(f"{alert.status} {alert.levels}", 125)
+    return _write_lines(figure, small, at, MOTION_COLOUR, 7.5) - 0.004
+
+
+def _write_lines(
+    figure: Figure, lines: list[str], at: float, colour: str = "black", size: float = 9.0
+) -> float:
     """Write lines of text and return how far the page is filled."""
     for line in lines:
-        figure.text(LEFT, at, literal(line), fontsize=9, color=colour)
-        at -= LINE
+        figure.text(LEFT, at, literal(line), fontsize=size, color=colour)
+        at -= LINE * size / 9.0
     return at
-
-
-def _write_numbers(figure: Figure, results: Results, at: float) -> float:
-    """Write the five numbers side by side and return how far the page is filled."""
-    # A large number over its meaning
-    width = (RIGHT - LEFT) / 5.0
-    for place, (value, meaning) in enumerate(five_numbers(results)):
-        left = LEFT + place * width
-        figure.text(left, at - 0.02, literal(value), fontsize=17, fontweight="bold")
-        for row, line in enumerate(wrap(meaning, 22)[:3]):
-            figure.text(left, at - 0.035 - 0.011 * row, literal(line), fontsize=7.5)
-    return at - 0.085
 
 
 def _write_section(
@@ -159,7 +167,9 @@ def _write_legend(figure: Figure, results: Results, at: float) -> float:
     entries = list[tuple[Text, Text, int]]()
     for name, colour in class_colours(results.region.classes).items():
         if count := results.tally.classes[name]:
-            words = literal(f"{shortened(name, 24)} {count}")
+            label = class_text(name, LANGUAGES[results.language])
+            number = written(count, 0, results.language)
+            words = literal(f"{shortened(label, 24)} {number}")
             text = figure.text(0.0, 0.0, words, fontsize=7.5)
             width = 0.016 + text.get_window_extent().width / figure.bbox.width
             if left > MAP_LEFT and left + width > RIGHT:
@@ -176,7 +186,9 @@ def _write_legend(figure: Figure, results: Results, at: float) -> float:
 
 def _write_pairs(figure: Figure, results: Results, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
-    figure.text(LEFT, at, WORDING[results.language]["worst_pairs"], fontsize=11, fontweight="bold")
+    figure.text(
+        LEFT, at, LANGUAGES[results.language]["worst_pairs"], fontsize=11, fontweight="bold"
+    )
     at -= 0.02
     _write_row(figure, _titles(results), at, MOTION_COLOUR)
     # One per line
@@ -186,8 +198,8 @@ def _write_pairs(figure: Figure, results: Results, at: float) -> None:
         cells = (
             str(position),
             shortened(str(pair["pair_id"]), 26),
-            shortened(str(pair["risk_class"]), 12),
-            *(in_language(text, results.language) for text in _number_cells(dict(pair))),
+            shortened(class_text(str(pair["risk_class"]), LANGUAGES[results.language]), 12),
+            *_number_cells(dict(pair), results.language),
             f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
         )
         _write_row(figure, cells, at, "black")
@@ -199,16 +211,16 @@ def _titles(results: Results) -> list[str]:
     """Return the titles of the columns; an ensemble lacks the needed gap."""
     hidden = set() if "demand" in results.listed else {"needed"}
     return [
-        WORDING[results.language][f"head_{key}"] if key and key not in hidden else ""
+        LANGUAGES[results.language][f"head_{key}"] if key and key not in hidden else ""
         for key in COLUMNS
     ]
 
 
-def _number_cells(pair: dict[Hashable, Any]) -> list[str]:
+def _number_cells(pair: dict[Hashable, Any], language: str) -> list[str]:
     """Return velocity, probability, gap and demand of a pair in words."""
     return [
-        speed_text(number(pair, "expected_impact_velocity")),
-        chance_text(number(pair, "probability")),
+        speed_text(number(pair, "expected_impact_velocity"), language),
+        chance_text(number(pair, "probability"), language),
         length_text(number(pair, "gap")),
         length_text(number(pair, "demand")) if "demand" in pair else "",
     ]
@@ -233,7 +245,7 @@ def _fit(text: Text, room: float) -> None:
 def _write_buildings(figure: Figure, results: Results, at: float) -> None:
     """Write the worst buildings in two columns."""
     figure.text(
-        LEFT, at, WORDING[results.language]["worst_buildings"], fontsize=11, fontweight="bold"
+        LEFT, at, LANGUAGES[results.language]["worst_buildings"], fontsize=11, fontweight="bold"
     )
     for position, building in enumerate(results.buildings.head(LISTED).to_dict("records")):
         # Five below each other

@@ -7,19 +7,21 @@ from unicodedata import normalize
 
 from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
-from per_obspy.report.page.texts import Language
 from per_obspy.report.results import Results
-from per_obspy.report.summary.statements import (
+from per_obspy.report.statements import (
     LISTED,
+    alert,
+    alert_line,
     building_sentence,
     first_steps,
-    five_numbers,
+    key_numbers,
     made_sentence,
     pair_sentence,
+    revision_line,
     station_sentences,
     sureness,
 )
-from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.texts import LANGUAGES, texts_of
 
 #: Longest line, characters.
 WIDTH = 72
@@ -27,18 +29,14 @@ WIDTH = 72
 #: Characters that are spoken, or a pause; anything else becomes a blank.
 _UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/-]")
 
-#: Symbols with a word, by language.
-_WORDS: dict[Language, dict[str, str]] = {
-    "en": {
-        "cm/s": "cm per second", "%": " percent", "°": " degrees", "&": " and ", "+": " plus ",
-    },
-    "es": {
-        "cm/s": "cm por segundo", "%": " por ciento", "°": " grados", "&": " y ", "+": " mas ",
-    },
+#: Symbols with a word, and the keys of the words.
+_WORDS = {
+    "m/s": "spoken_speed", "%": "spoken_percent", "°": "spoken_degrees", "&": "spoken_and",
+    "+": "spoken_plus", "–": "spoken_to", "≥": "spoken_from",
 }  # fmt: skip
 
 
-def spoken(text: str, language: Language = "en") -> str:
+def spoken(text: str, language: str = "en") -> str:
     """
     Return a text as plain letters and digits: no accents, symbols as words or blanks.
 
@@ -47,10 +45,11 @@ def spoken(text: str, language: Language = "en") -> str:
     >>> spoken("Añasco_1 <script>"), spoken("84 %")
     ('Anasco 1 script', '84 percent')
     """
-    for symbol, word in _WORDS[language].items():
-        text = text.replace(symbol, word)
+    for symbol, key in _WORDS.items():
+        text = text.replace(symbol, f" {LANGUAGES[language][key]} ")
     letters = normalize("NFKD", text).encode("ascii", "ignore").decode()
-    return " ".join(_UNSPOKEN.sub(" ", letters).split())
+    # A word that replaces a symbol stands right before what follows it
+    return re.sub(r" (?=[.,:;)])", "", " ".join(_UNSPOKEN.sub(" ", letters).split()))
 
 
 def summary_lines(results: Results) -> list[str]:
@@ -58,7 +57,7 @@ def summary_lines(results: Results) -> list[str]:
     lines = list[str]()
     for title, sentences in _sections(results).items():
         if sentences:
-            lines += ["", spoken(title).upper()] if title else []
+            lines += ["", spoken(title, results.language).upper()] if title else []
             plain = (spoken(sentence, results.language) for sentence in sentences)
             lines += [line for sentence in plain for line in wrap(sentence, WIDTH)]
     return lines
@@ -66,7 +65,7 @@ def summary_lines(results: Results) -> list[str]:
 
 def _sections(results: Results) -> dict[str, list[str]]:
     """Return the sentences of each section by its title; the first title is empty."""
-    texts, language = WORDING[results.language], results.language
+    texts, language = texts_of(results.language, results.stem), results.language
     # Pairs and buildings with their places in the ranking
     worst, hit = (table.head(LISTED).iterrows() for table in (results.listed, results.buildings))
     pairs = [pair_sentence(dict(row), language) for _, row in worst]
@@ -74,8 +73,8 @@ def _sections(results: Results) -> dict[str, list[str]]:
     # In the order of their weight for a listener
     return {
         "": _head(results),
-        texts["five_numbers"]: [f"{value} {meaning}." for value, meaning in five_numbers(results)],
-        texts["what_first"]: first_steps(results),
+        texts["numbers"]: [f"{value} {meaning}." for value, meaning in key_numbers(results)],
+        texts["do_first"]: first_steps(results),
         texts["worst_pairs"]: _numbered(pairs),
         texts["worst_buildings"]: _numbered(buildings),
         texts["how_sure"]: sureness(results),
@@ -84,8 +83,9 @@ def _sections(results: Results) -> dict[str, list[str]]:
 
 
 def _head(results: Results) -> list[str]:
-    """Return title, coverage, earthquake and stations."""
-    texts, language = WORDING[results.language], results.language
+    """Return title, alert, coverage, earthquake and stations."""
+    texts, language, revision = LANGUAGES[results.language], results.language, results.revision
+    line = revision_line(revision, language)
     # Whatever has no verdict comes before the earthquake, and before the title if it is much
     account = coverage_sentences(results.coverage, language)
     warned = int(results.coverage.lacks_many)
@@ -93,6 +93,9 @@ def _head(results: Results) -> list[str]:
         *account[:warned],
         results.region.title[:200],
         *([texts["simulated_spoken"]] if results.region.simulated else []),
+        *([f"{line}."] if line else []),
+        alert_line(results),
+        alert(results).status,
         *account[warned:],
         *results.source,
         *station_sentences(results.stations, language),

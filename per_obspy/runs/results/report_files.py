@@ -4,11 +4,10 @@ import csv
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,12 +25,12 @@ from per_obspy.report.overview import draw_overview
 from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
 from per_obspy.report.page.map_lines import lines_around, read_outlines
 from per_obspy.report.page.packing import MOST_COLUMNS
-from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.results import Results
+from per_obspy.report.statements import alert_line
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
-from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
+from per_obspy.report.texts import LANGUAGES
 from per_obspy.results.ranked_table import table_name
 from per_obspy.results.station_summary import COLUMNS as STATION_COLUMNS
 from per_obspy.results.totals import (
@@ -68,9 +67,10 @@ LISTED_COLUMNS = (
 HIT = "neighbours_that_can_hit"
 
 
-class Report(NamedTuple):
+@dataclass
+class Report:
     """
-    Files that the report has written.
+    Files that the report has written, and what it says first.
 
     Attributes
     ----------
@@ -78,10 +78,13 @@ class Report(NamedTuple):
         Its files.
     faults : list of str
         Figures and layers that could not be made, each with the reason.
+    alert : str
+        Level and sentence of the alert; empty without a pair.
     """
 
     outputs: list[Path]
     faults: list[str]
+    alert: str = ""
 
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
@@ -120,8 +123,6 @@ class TableReader:
     ----------
     tally : PairTally
         Counts of all pairs.
-    recorded : int or None
-        Rank of the worst pair that has a record; None if no pair has one.
     """
 
     def __init__(
@@ -130,7 +131,6 @@ class TableReader:
         self.tally = PairTally(classes)
         # Settings, then the summaries of the pieces
         self.totals, self.pairs, self.is_whole = totals, pairs, is_whole
-        self.recorded: int | None = None
         self._classes = [*classes, UNKNOWN_CLASS]
         self._counted = CountedTotals()
         self._listed = list[pd.DataFrame]()
@@ -159,14 +159,6 @@ class TableReader:
         step = -(-self.pairs // SHOWN)
         columns = [name for name in SHOWN_COLUMNS if name in piece]
         self._shown.append(piece.loc[rank % step == 1 % step, columns])
-        self._add_recorded(piece)
-
-    def _add_recorded(self, piece: pd.DataFrame) -> None:
-        """Take the rows whose pounding was observed, and the first one with a record."""
-        # Pieces come in any order
-        if "station" in piece and (piece["station"] != "").any():
-            first = int(piece.loc[piece["station"] != "", "rank"].iloc[0])
-            self.recorded = min(first, self.recorded or first)
         if set(OBSERVED_COLUMNS) <= set(piece):
             self._observed.append(piece.loc[piece["observed"].notna(), OBSERVED_COLUMNS])
 
@@ -337,6 +329,7 @@ def write_files(results: Results, folder: Path, spreadsheet: bool, report: Repor
         Takes files and faults.
     """
     stem, region = results.stem, results.region
+    report.alert = alert_line(results)
     # Words first
     with report.tried(folder / "summary.txt"):
         write_text(results, folder / "summary.txt")
@@ -423,11 +416,11 @@ def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
     return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
 
 
-def made_with(language: Language) -> tuple[str, str]:
+def made_with(language: str) -> tuple[str, str]:
     """Return the software version as title and text of the provenance."""
     return LANGUAGES[language]["made_with"], f"per_obspy {version('per_obspy')}"
 
 
-def content_note(notes: Sequence[str], language: Language) -> list[tuple[str, str]]:
+def content_note(notes: Sequence[str], language: str) -> list[tuple[str, str]]:
     """Return sentences on the content of the page as a row of its provenance."""
-    return [(WORDING[language]["page_content"], " ".join(notes))] if notes else []
+    return [(LANGUAGES[language]["page_content"], " ".join(notes))] if notes else []

@@ -3,13 +3,13 @@
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.records.shakemap import map_event
-from per_obspy.report.results import Region
+from per_obspy.report.results import Region, Revision
 from per_obspy.results.station_summary import COLUMNS
 from per_obspy.resume import StatusError, read_status
 
@@ -87,25 +87,6 @@ def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> 
     return facts
 
 
-class Revision(NamedTuple):
-    """
-    Revision of the results of a watched earthquake.
-
-    Attributes
-    ----------
-    number : int
-        0 if the run is none.
-    time : str
-        ``HH:MM``, UTC; empty where unknown.
-    event_id : str
-        Identifier of the earthquake in its list; empty where unknown.
-    """
-
-    number: int
-    time: str
-    event_id: str
-
-
 def revision_of_run(record: Path) -> Revision:
     """
     Return the revision that a run is made for.
@@ -126,7 +107,7 @@ def revision_of_run(record: Path) -> Revision:
     name = known.get("event_id")
     return Revision(
         number,
-        time[11:16] if TIME.match(time) else "",
+        time[:16].replace("T", " ") if TIME.match(time) else "",
         shortened(name, LONGEST_ID) if isinstance(name, str) else "",
     )
 

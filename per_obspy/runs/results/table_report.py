@@ -12,8 +12,8 @@ from per_obspy.config import Design, Ensemble
 from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.errors import CatalogError
 from per_obspy.report.page.document import write_page
-from per_obspy.report.results import Drawings, Event, Region, Results
-from per_obspy.report.summary.wording import WORDING
+from per_obspy.report.results import Drawings, Region, Results, Revision
+from per_obspy.report.texts import LANGUAGES
 from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.runs.results.report_files import (
@@ -62,12 +62,12 @@ def report_design(
         raise CatalogError("totals", reason)
     # The spectrum replaces the earthquake
     classes, language = list(settings.screening.classes), settings.report.language
-    texts, spectrum = WORDING[language], name_text(settings.spectrum.name)
+    texts, spectrum = LANGUAGES[language], name_text(settings.spectrum.name)
     region = _region(texts["spectrum_title"].format(name=spectrum), classes, simulated=False)
     source = [texts["spectrum"].format(name=spectrum)]
     results = Results(
-        "design", region, coverage, language, Event(source=" ".join(source)), source,
-        own=list(DESIGN),
+        "design", region, coverage, language, Revision(), source,
+        own=list(DESIGN), class_limits=settings.screening.classes,
         provenance=[made_with(language), *content_note([texts["page_design"]], language)],
     )  # fmt: skip
     reader, outlines = (
@@ -109,12 +109,13 @@ def report_ensemble(
         return Report([], [])
     # The scenarios replace the earthquake
     limits, language = ScreeningSettings(), settings.report.language
-    texts, classes, stations = WORDING[language], list(limits.classes), runs.stations()
+    texts, classes, stations = LANGUAGES[language], list(limits.classes), runs.stations()
     region = _region(settings.name, classes, simulated, stations)
     source = _scenario_sentences(settings)
     results = Results(
-        "ensemble", region, coverage, language, Event(source=" ".join(source)), source,
+        "ensemble", region, coverage, language, Revision(), source,
         stations=stations, own=list(ensemble_columns(settings.weights, settings.yearly)),
+        class_limits=limits.classes,
         provenance=[made_with(language), *content_note([texts["page_ensemble"]], language)],
     )  # fmt: skip
     # Buildings, outlines and histories are those of the runs
@@ -147,7 +148,7 @@ def _write(
 
 def _scenario_sentences(settings: Ensemble) -> list[str]:
     """Return sentences on the number of scenarios, and the names of the first ones."""
-    texts = WORDING[settings.report.language]
+    texts = LANGUAGES[settings.report.language]
     sentence = texts["scenario_rate" if settings.yearly else "scenario_weight"]
     return [
         texts["scenarios"].format(count=len(settings.weights)),

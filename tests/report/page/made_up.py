@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from per_obspy.report.results import Drawings, Event, Region, Results
+from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.tally import PAGE_PAIRS, PairTally
 from per_obspy.results.coverage import Coverage
 
@@ -101,10 +101,11 @@ def page_data(table, language="en", **changes):
     history = {"time": [0.0, 1.0], "one": [-5.0, 5.0], "two": [-9.0, 9.0], "impacts": [[0.4, 0.7]]}
     results = Results(
         "risk",
-        Region("A made-up quarter", CLASSES, True, pd.DataFrame()),
+        Region("A made-up quarter", CLASSES, True, pd.DataFrame(), (13.0, 43.0)),
         Coverage(len(table), len(table)),
         language,
-        Event("2026-01-02 03:04:05", "", 6.4, (13.0, 43.0, 9000.0)),
+        Revision(0, "2026-01-02 04:12", ""),
+        ["First record 2026-01-02 03:04.", "Magnitude 6.4."],
         tally=tally,
         worst=table.head(PAGE_PAIRS),
         stations=stations,
@@ -114,6 +115,7 @@ def page_data(table, language="en", **changes):
         lines={"coast": [[12.9, 43.0, 13.3, 43.3]], "borders": []},
         drawings=Drawings(histories={1: history}),
         provenance=[("made with", "per_obspy")],
+        class_limits={"severe": 0.5, "high": 0.2, "moderate": 0.05, "low": 0.0},
     )
     return replace(results, **changes)
 

@@ -1,8 +1,7 @@
 """
 The page as a person uses it, in Chromium; its script and style are package data.
 
-Its content comes from per_obspy.report.page.document, per_obspy.report.page.document and
-per_obspy.report.page.first_screen.
+Its content comes from per_obspy.report.page.document and per_obspy.report.statements.
 """
 
 import csv
@@ -14,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from per_obspy.report.results import Drawings, Event
+from per_obspy.report.results import Drawings, Revision
 
 from .made_up import HOSTILE, page_data, pair_table, with_region
 
@@ -41,13 +40,19 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
         "rgb(176, 0, 0)"
     )
     event = page.page.inner_text("#event")
-    for fact in (
-        "Magnitude 6.4",
-        "2026-01-02 03:04:05 UTC",
-        "43.00°",
-        "13.00°",
-    ):
+    for fact in ("First record 2026-01-02 03:04.", "Magnitude 6.4."):
         assert fact in event
+    # Probabilities fall evenly to 0: 6 of 12, and the three severe pairs are the first ones
+    assert page.page.inner_text("#alert").startswith(
+        "LEVEL: SEVERE. About 6 of 12 pairs (50 %) hit each other; "
+    )
+    assert page.page.eval_on_selector("#alert", "e => getComputedStyle(e).borderLeftColor") == (
+        "rgb(127, 0, 0)"
+    )
+    status = page.page.inner_text("#status")
+    assert status.startswith("Issued 2026-01-02 04:12 UTC. Automatic, elastic, not reviewed.")
+    assert "severe ≥ 0.5 m/s, high ≥ 0.2 m/s, moderate ≥ 0.05 m/s" in status
+    assert page.texts(".shares_legend span") == ["screened: 12"]
     expected = page.page.inner_text("#expected")
     assert expected == (
         "2 stations expected; 1 used: XX.A1; 1 missing or rejected: XX.B2 (clipped: 9 equal "
@@ -55,9 +60,10 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
     )
     assert page.page.is_hidden("#revision")
     numbers = page.texts("#numbers dd")
-    # 12 pairs, 6 of them sure or likely, 3 severe; 6 expected: probabilities fall evenly to 0
-    assert numbers[:4] == ["12", "6", "6", "3"]
-    assert len(numbers) == 5
+    # 12 pairs; 6 expected, 3 of them sure and 9 at least possible; no gap is unknown
+    assert numbers[0] == "6 (3–9)"
+    assert numbers[2] == "0"
+    assert len(numbers) == 4
     assert "P0000000, P0000001" in page.page.inner_text("#todo")
     assert "6 of 12 pairs have inputs that are derived" in page.page.inner_text("#sure")
 
@@ -72,7 +78,7 @@ def test_real_motion_is_not_called_simulated(opened):
     ("field", "value", "passes"),
     [
         ("#probability", "50", lambda pair: pair["probability"] >= 0.5),
-        ("#velocity", "40", lambda pair: pair["expected_impact_velocity"] >= 0.4),
+        ("#velocity", "0.4", lambda pair: pair["expected_impact_velocity"] >= 0.4),
         ("#search", "p0000007", lambda pair: pair["pair_id"] == "P0000007"),
         ("#search", "B15", lambda pair: pair["building_id_1"] == "B15"),
     ],
@@ -340,9 +346,9 @@ def test_sensitivity_of_a_pair(opened):
 
 
 def test_revision_is_shown(opened):
-    event = Event("", "2026-01-02 03:04:05", 6.4, revision=3, revised="04:12")
-    page = opened(page_data(pair_table(3), event=event))
-    assert page.page.inner_text("#revision") == "Revision 3, 04:12 UTC"
+    revision = Revision(3, "2026-01-02 04:12")
+    page = opened(page_data(pair_table(3), revision=revision))
+    assert page.page.inner_text("#revision") == "Revision 3, 2026-01-02 04:12 UTC"
 
 
 def test_what_a_screen_reader_is_given(opened):
@@ -363,7 +369,7 @@ def test_what_a_screen_reader_is_given(opened):
         "- status: 30 of 30 pairs of this page (30 screened)",
         '- button "export as CSV"',
         '- columnheader "rank"',
-        '- columnheader "impact, cm/s"',
+        '- columnheader "impact, m/s"',
     ):
         assert part in tree, part
     # A filter says how many pairs are left, a choice which pair it is
@@ -476,6 +482,7 @@ def test_spanish(opened):
     # Nothing of the page is left in English but names of data
     english = re.compile(r"\b(the|of|with|and|is|severe|moderate|high|low)\b")
     words = page.page.inner_text("main").replace("made with", "")
+    words += page.page.inner_text("#alert") + page.page.inner_text("#status")
     assert english.findall(words) == []
 
 
@@ -530,8 +537,9 @@ MEASURES = {
 def test_none_needed_is_not_said_of_what_is_unknown_or_not_computed(opened, kind, language):
     """Catch a page that calls every pair of a spectrum, or of unknown gap, safe as it is."""
     stem = "risk" if kind in ("run", "shakemap") else kind
-    event = Event(source="A spectrum or a map.")
-    page = opened(page_data(measures(kind), language, stem=stem, drawings=Drawings(), event=event))
+    source = ["A spectrum or a map."]
+    data = page_data(measures(kind), language, stem=stem, drawings=Drawings(), source=source)
+    page = opened(data)
     details = []
     for row in range(1, 5):
         page.page.click(f"#pairs tbody tr:nth-child({row}) button")
@@ -580,8 +588,8 @@ def test_a_table_of_few_columns_has_a_page_too(opened):
     columns += ["demand", "demand_rule", "longitude", "latitude", "per_1"]
     table = pair_table(30)[columns]
     nothing = pd.DataFrame()
-    event = Event(source="Screened by a spectrum.")
-    data = page_data(table, stations=nothing, areas=nothing, drawings=Drawings(), event=event)
+    source = ["Screened by a spectrum."]
+    data = page_data(table, stations=nothing, areas=nothing, drawings=Drawings(), source=source)
     page = opened(data)
     assert page.page.inner_text("#event") == "Screened by a spectrum."
     page.page.click("#pairs tbody tr:first-child button")
@@ -614,7 +622,7 @@ def test_a_million_pairs_fit_into_a_small_page(opened):
     table = pair_table(1_000_000)
     page = opened(page_data(table))
     assert page.path.stat().st_size < LARGEST_PAGE
-    assert page.texts("#numbers dd")[0] == "1,000,000"
+    assert page.texts(".shares_legend span") == ["screened: 1,000,000"]
     assert page.page.inner_text("#count").startswith("20,000 of 20,000")
     assert "The worst 20,000 of 1,000,000" in page.page.inner_text("#cells")
     assert drawing_seconds(page) < LONGEST_DRAWING

@@ -12,6 +12,7 @@ import shutil
 import pandas as pd
 import pytest
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.runs.results import report_files
 from per_obspy.runs.run import report
 
@@ -49,7 +50,7 @@ def test_page_states_what_the_run_found(content, risk):
     assert content["pair_count"] == len(risk)
     counts = {state["name"]: state["count"] for state in content["states"]}
     assert counts["yes"] == (risk["state"] == "yes").sum()
-    assert content["numbers"][0][0] == str(len(risk))
+    assert content["coverage_bar"][0][1] == len(risk)
     assert content["expected"] == ("3 stations expected; 3 used: XX.S001, XX.S002, XX.S003.")
     assert content["revision"] == ""
     assert [row[0] for row in content["stations"]["rows"]] == ["XX.S001", "XX.S002", "XX.S003"]
@@ -87,7 +88,7 @@ def test_stations_are_drawn_with_their_peaks_and_spectra(content):
         drawn = content["station_drawings"][row[0]]
         peaks = [max(map(abs, drawn[name])) for name in ("north", "east")]
         # Three digits
-        assert max(peaks) == pytest.approx(row[heads.index("PGA, m/s²")], rel=5e-3)
+        assert max(peaks) == pytest.approx(row[heads.index("PGA, g")] * STANDARD_GRAVITY, rel=5e-3)
         at_one = min(range(12), key=lambda i: abs(drawn["period"][i] - 1.0))
         assert drawn["per"][at_one] == pytest.approx(row[heads.index("PER (1 s), cm")], rel=5e-3)
 
@@ -133,7 +134,7 @@ def test_revision_of_the_run_is_on_the_page(copied):
     configuration = write_configuration(copied, "[report]\nrevision = 3\n")
     report(configuration, copied / "out")
     shown = page_content(copied / "out" / "report.html")["revision"]
-    assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
+    assert re.fullmatch(r"Revision 3(, [-\d]{10} \d\d:\d\d UTC)?", shown)
 
 
 def test_all_buildings_that_a_neighbour_can_hit_are_counted(copied, monkeypatch):

@@ -74,7 +74,7 @@ def test_every_screening_has_everything(done, stem):
     assert names <= {file.name for file in folder.iterdir()}
     assert (folder / "figures" / "overview.png").exists()
     text = (folder / "summary.txt").read_text()
-    assert "4 pairs screened, all of the table." in text
+    assert "All rows of the pair table are screened: 4." in text
     # simulated motion is never taken for an earthquake
     assert ("SIMULATED" in text) == (stem != "design")
     assert pyogrio.read_info(folder / f"{stem}.gpkg", layer="pairs")["features"] == 4
@@ -141,7 +141,7 @@ def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
     content = page_content(tmp_path / "es" / "report.html")
     assert content["texts"]["close"] == "cerrar"
     text = (tmp_path / "es" / "summary.txt").read_text()
-    assert "4 pares evaluados, todos los de la tabla." in text
+    assert "Se evaluan todas las filas de la tabla de pares: 4." in text
     assert not re.search(r"\b(the|pairs|with|of)\b", text.split("\n\n", 1)[1])
 
 
@@ -171,7 +171,7 @@ def test_the_summary_of_a_run_has_its_earthquake_and_stations(done):
     text = (done["risk"] / "summary.txt").read_text()
     assert "Earthquake of 2000-01-01 00:00:00 UTC." in text
     assert "Magnitude 6.5." in text
-    assert "Stations used, 1: XX.S001." in text
+    assert "1 station expected; 1 used: XX.S001." in text
     layers = dict(pyogrio.list_layers(done["risk"] / "risk.gpkg"))
     assert {"pairs": "LineString", "stations": "Point", "areas": "MultiPolygon"}.items() <= (
         layers.items()

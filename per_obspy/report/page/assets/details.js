@@ -45,15 +45,15 @@ class Details {
     if (known("probability")) said.push(t("says_probability", { value: this.page.percent(this.value("probability", i)) }));
     if (known("expected_impact_velocity") && this.value("expected_impact_velocity", i) > 0) {
       said.push(t(known("impact_velocity_84") ? "says_velocity" : "says_velocity_alone", {
-        value: this.page.number(100 * this.value("expected_impact_velocity", i), 0),
-        high: this.page.number(100 * this.value("impact_velocity_84", i), 0),
+        value: this.page.number(this.value("expected_impact_velocity", i), 2),
+        high: this.page.number(this.value("impact_velocity_84", i), 2),
       }));
     }
     const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
     said.push(gap);
     if (known("demand")) said.push(t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
     if (this.value("impacts", i) > 0) {
-      said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(100 * this.value("impact_velocity_exact", i), 0) }));
+      said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(this.value("impact_velocity_exact", i), 2) }));
     }
     if (known("expected_amplification")) said.push(t("says_amplification", { value: number(this.value("expected_amplification", i), 2) }));
     const station = this.value("station", i);

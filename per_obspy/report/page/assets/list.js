@@ -6,7 +6,7 @@ const PAGE_ROWS = 100;
 // Columns of the table, with the factor to the unit of their heading and their decimals
 const LISTED = [
   ["rank", 1, 0], ["pair_id"], ["risk_class"], ["state"], ["probability", 100, 0],
-  ["expected_impact_velocity", 100, 0], ["gap", 100, 1], ["demand", 100, 1],
+  ["expected_impact_velocity", 1, 2], ["gap", 100, 1], ["demand", 100, 1],
   ["missing_gap", 100, 1], ["expected_amplification", 1, 2], ["station"],
 ];
 
@@ -31,7 +31,7 @@ class PairList {
     this.classes = this.boxes(t("risk_class"), content.classes);
     this.states = this.boxes(t("state"), content.states);
     this.number("probability", t("least_probability"), 100);
-    this.number("velocity", t("least_velocity"), 1000);
+    this.number("velocity", t("least_velocity"), 100);
     this.choice("area", t("area"), pairs.column.area ? [...pairs.column.area.texts].sort() : []);
     this.makeFlags();
     const search = element("input", { type: "search", id: "search", maxlength: "120", placeholder: t("search_hint") });
@@ -135,7 +135,7 @@ class PairList {
     this.page.shownClasses = classes;
     this.page.shownStates = states;
     const probability = Number(this.fields.probability.value) / 100;
-    const velocity = Number(this.fields.velocity.value) / 100;
+    const velocity = Number(this.fields.velocity.value);
     const area = this.codesOf("area", (text, chosen) => text === chosen);
     const flags = this.flagCodes();
     const matches = this.searched();

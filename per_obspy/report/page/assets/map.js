@@ -218,14 +218,17 @@ class PairMap {
     // Names of many stations would hide the pairs' places
     const seen = places.filter(([, x, y]) => Math.abs(this.x(x) - this.width / 2) < this.width / 2 && Math.abs(this.y(y) - this.height / 2) < this.height / 2);
     const named = seen.length <= 12;
-    for (const [name, longitude, latitude, used] of places) {
+    for (const [name, longitude, latitude, used, peak] of places) {
       const [x, y] = [this.x(longitude), this.y(latitude)];
+      // As large as the ground shook there
+      const size = 0.6 + Math.min(1.4, 1.6 * Math.sqrt(peak || 0));
       pen.setLineDash(used ? [] : [2, 2]);
       pen.beginPath();
-      pen.moveTo(x, y - 6); pen.lineTo(x + 5.5, y + 4); pen.lineTo(x - 5.5, y + 4);
+      pen.moveTo(x, y - 6 * size); pen.lineTo(x + 5.5 * size, y + 4 * size); pen.lineTo(x - 5.5 * size, y + 4 * size);
       pen.closePath();
       pen.stroke();
-      if (named) pen.fillText(name, x + 8, y + 4);
+      const amplitude = peak ? ` ${this.page.number(peak, 2)} g` : "";
+      if (named) pen.fillText(name + amplitude, x + 3 + 6 * size, y + 4);
     }
     pen.setLineDash([]);
   }

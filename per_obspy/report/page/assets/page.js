@@ -20,7 +20,7 @@ class Page {
       if (!Number.isFinite(value)) return "–";
       // No minus before a zero
       const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
-      return shown.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+      return shown.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "always" });
     };
     this.setGrades();
     this.setBuildings();
@@ -31,7 +31,7 @@ class Page {
   // A number with at most four digits; tiny ones would have dozens of zeros
   short(value) {
     if (value !== 0 && Math.abs(value) < 0.001) return `< ${this.number(0.001, 3)}`;
-    return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4 });
+    return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4, useGrouping: "always" });
   }
 
   // A probability in percent: 0 and 100 only where it is exactly that
@@ -88,7 +88,7 @@ class Page {
       rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
       hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.percent(column.probability_common[i]),
     })];
-    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(100 * column.impact_velocity[i], 0) }));
+    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(column.impact_velocity[i], 2) }));
     const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
     if (prevention) said.push(this.t("building_prevention", { value: prevention }));
     return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
@@ -98,7 +98,7 @@ class Page {
 
   shortText(pair) {
     const { column } = this.pairs;
-    return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(100 * column.expected_impact_velocity[pair], 0)} cm/s`;
+    return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(column.expected_impact_velocity[pair], 2)} m/s`;
   }
 
   flagName(name) { return (this.content.flag_names || {})[name] || name.replaceAll("_", " "); }
@@ -136,9 +136,8 @@ class Page {
     for (const place of document.querySelectorAll("[data-label]")) place.setAttribute("aria-label", this.t(place.dataset.label));
     document.title = `${content.title} – per_obspy`;
     byId("title").textContent = content.title;
-    for (const [i, text] of (content.coverage || []).entries()) {
-      byId("coverage").append(element("p", { class: content.warns && !i ? "warning" : "" }, text));
-    }
+    this.fillAlert();
+    this.fillCoverage();
     byId("event").textContent = content.event;
     byId("revision").textContent = content.revision || "";
     byId("expected").textContent = content.expected || "";
@@ -153,6 +152,36 @@ class Page {
     for (const text of content.sure) byId("sure").append(element("li", {}, text));
     byId("map").setAttribute("aria-label", this.t("map_help"));
     this.fillLegend();
+  }
+
+  fillAlert() {
+    const { level, colour, sentence, status, levels } = this.content.alert;
+    byId("alert").style.borderColor = colour;
+    byId("alert").querySelector("strong").textContent = `${level}.`;
+    byId("alert").querySelector("span").textContent = sentence;
+    byId("status").textContent = [status, levels].join(" ");
+  }
+
+  // Rows of the file as a bar of shares, and in sentences
+  fillCoverage() {
+    const { content, t } = this;
+    const [warning, ...others] = content.warns ? content.coverage : ["", ...content.coverage];
+    if (warning) byId("coverage").append(element("p", { class: "warning" }, warning));
+    const parts = content.coverage_bar.filter(([, count]) => count > 0);
+    const all = parts.reduce((sum, [, count]) => sum + count, 0);
+    const bar = element("div", { class: "shares", role: "img", "aria-label": t("coverage_bar") });
+    const legend = element("p", { class: "small shares_legend" }, `${t("coverage_file")}: ${this.whole(all)}`);
+    for (const [label, count, colour] of parts) {
+      const part = element("span", {});
+      part.style.flexGrow = String(count);
+      part.style.backgroundColor = colour;
+      bar.append(part);
+      const mark = drawing("svg", { width: 12, height: 12, "aria-hidden": "true" });
+      mark.append(drawing("rect", { width: 12, height: 12, fill: colour }));
+      legend.append(element("span", {}, mark, `${label}: ${this.whole(count)}`));
+    }
+    byId("coverage").append(bar, legend);
+    for (const text of others) byId("coverage").append(element("p", { class: "small" }, text));
   }
 
   // Cells are counts by class and state: they can follow no other filter
