@@ -69,8 +69,9 @@ def left_out(event: RealEvent, screening: Screening = SCREENING) -> pd.DataFrame
         source = hypocentre_of(other.attrs for other in event.stations)
         field = prepared_field(others, screening.interpolation, source)
         ground = RegionalMotion(stations_of(others)[0], field, None)
-        table = pd.concat(_at_place(station, others, ground, screening), ignore_index=True)
-        tables.append(table.assign(event=event.name, station=str(station["station"].item())))
+        place = {"event": event.name, "station": str(station["station"].item())}
+        # a record may support no pair at all
+        tables += [table.assign(**place) for table in _at_place(station, others, ground, screening)]
     return pd.concat(tables, ignore_index=True)
 
 

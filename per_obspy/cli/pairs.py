@@ -156,9 +156,9 @@ def find_pairs(
         float | None,
         typer.Option(
             min=0.0,
-            max=1.0,
-            help="Standard deviation of drawn gaps, m, touching ones too; 0 for exact outlines. "
-            "0.1 is assumed and marked if it is not given.",
+            max=3.0,
+            help="Standard deviation of gaps, m, touching ones too; 0 for exact outlines. If it is "
+            "not given, it is assumed by the origin of the outlines, and marked.",
         ),
     ] = None,
     id_column: Annotated[str | None, typer.Option(help="Column of the identifiers.")] = None,
@@ -223,8 +223,10 @@ def _print_footprint_pairs(
     print(f"{counted}: {output}")
     # Further files, assumptions, and reasons of rejected rows
     print(f"  outlines and columns of all buildings: {buildings}")
-    if "assumed" in table["gap_std_source"].to_numpy():
-        print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")
+    for (source, deviation), some in table.groupby(["gap_std_source", "gap_std"], sort=True):
+        if source != "given":
+            kind = "learned from images" if source == "learned" else "drawn"
+            print(f"  {len(some)} gaps of outlines {kind}: {deviation:g} m of deviation is assumed")
 
 
 @pairs.command("check")

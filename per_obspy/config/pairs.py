@@ -158,8 +158,10 @@ class Footprints(Section):
     gap_std: float | None = Field(
         None,
         ge=0,
-        le=1,
-        description="standard deviation of drawn gaps, m; if not set, assumed and marked so",
+        le=3,
+        description=(
+            "standard deviation of gaps, m; if not set, assumed by the origin of the outlines"
+        ),
     )
     columns: dict[str, str] = Field(
         default_factory=dict,

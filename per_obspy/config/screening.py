@@ -205,20 +205,6 @@ class Screening(Section):
     exact: bool = Field(
         True, description="exact demand and history of every pair; false: estimates only, faster"
     )
-    model_median: float = Field(
-        1.16,
-        gt=0,
-        description=(
-            "median of the ratio of the critical gap by PER to the exact one (docs/reliability.md)"
-        ),
-    )
-    model_dispersion: float = Field(
-        0.35,
-        ge=0,
-        description=(
-            "log-standard deviation of the ratio of the critical gap by PER to the exact one"
-        ),
-    )
     states: States = States()
     per_to_sd: float = Field(
         1.5, ge=1, description="ratio PER/SD above which a gap from PER is flagged as far too large"

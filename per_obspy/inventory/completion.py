@@ -199,7 +199,7 @@ def _add_gap(table: _Columns, building: config.Building) -> None:
     deviation = table.given("gap_std", 0.0)
     # A deviation may be a default of the command that made the table
     if "gap_std_source" in table.pairs:
-        is_assumed = table.pairs["gap_std_source"] == "assumed"
+        is_assumed = table.pairs["gap_std_source"].isin(("assumed", "learned"))
         table.derived["gap_std"] = is_assumed.to_numpy(dtype=bool)
     table.columns["gap"], table.columns["gap_std"] = table.given("gap"), deviation
     if building.gap is not None:

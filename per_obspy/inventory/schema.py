@@ -26,8 +26,9 @@ EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 #: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 
-#: Source of a gap's standard deviation: a known value or an assumed default.
-DEVIATION_SOURCES = ("given", "assumed")
+#: Source of a gap's standard deviation: a known value or an assumed default; or, whatever it is, a
+#: gap between outlines that were learned from images.
+DEVIATION_SOURCES = ("given", "assumed", "learned")
 
 #: Whether both buildings are within one property.
 ONE_PROPERTY = ("yes", "no")
@@ -86,8 +87,9 @@ _PAIR = (
            required=True, may_be_empty=True, low=0.0, high=10.0,
            hint="given in millimetres or centimetres by mistake?"),
     Column("gap_std", "float64", "m", "standard deviation of the measured gap",
-           low=0.0, high=1.0, hint="in centimetres or millimetres?"),
-    Column("gap_std_source", "str", "", "whether gap_std is given or assumed",
+           low=0.0, high=3.0, hint="in centimetres or millimetres?"),
+    Column("gap_std_source", "str", "",
+           "whether gap_std is given, assumed, or that of outlines learned from images",
            choices=DEVIATION_SOURCES),
     Column("azimuth", "float64", "degrees",
            "direction from building 1 to building 2, clockwise from north", low=0.0, high=360.0),

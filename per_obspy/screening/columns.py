@@ -304,6 +304,10 @@ FLAGS: dict[str, str] = {
         "estimate or a limit: see cell_notes"
     ),
     "touching": "gap 0: the single hit is outside its reliable range",
+    "learned_outlines": (
+        "an outline was learned from images, which show no gap to be wide enough: the state is not "
+        "no"
+    ),
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"
     ),

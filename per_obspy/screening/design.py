@@ -2,10 +2,9 @@
 Pairs under a design or user spectrum: the spectrum, and the table without a record.
 
 There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral
-displacement. On broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact
-one, a log-standard deviation of 0.14, and is too small in two of three cases. A gap below it is a
-finding of the demand only; state, class and rank follow from the population, which includes that
-error and resamples uncertain periods and dampings.
+displacement. The gap from SD and eq. (16) is uncertain (`sd_error`), and too small in two of three
+cases. A gap below it is a finding of the demand only; state, class and rank follow from the
+population, which includes that error and resamples uncertain periods and dampings.
 """
 
 from pathlib import Path

@@ -315,7 +315,7 @@ def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
     moves_apart = demand > ROUND_OFF * values(block.table, "absolute_gap")[:, None]
     demand = np.where(moves_apart, demand, 0.0)
     # expected motion between the stations of the same buildings
-    ln_field = ln_field_demand(block.station, sample, block.screening).reshape(demand.shape)
+    ln_field = ln_field_demand(block.station, sample).reshape(demand.shape)
     return _at_site(block, nodes, demand, velocity, ln_field)
 
 

@@ -26,6 +26,13 @@ def period_is_derived(pairs: Table) -> BoolArray:
     return np.fromiter(map(has_period.__getitem__, derived), bool, len(derived))
 
 
+def outlines_are_learned(pairs: Table) -> BoolArray:
+    """Return a mask of pairs with an outline that was learned from images."""
+    if "gap_std_source" not in pairs:
+        return np.zeros(len(pairs["gap"]), dtype=bool)
+    return np.asarray(pairs["gap_std_source"], dtype=object) == "learned"
+
+
 def joined_flags(raised: Mapping[str, BoolArray]) -> TextArray:
     """Join the names of the flags of each row, in the order of ``FLAGS``, with blanks."""
     return joined_names({name: raised[name] for name in FLAGS if name in raised})
@@ -47,6 +54,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "unknown_gap": np.asarray(unknown, dtype=bool),
         "doubtful_cell": has_note,
         "touching": gap == 0.0,
+        "learned_outlines": outlines_are_learned(table),
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": period_is_derived(table),

@@ -277,10 +277,6 @@ def _received(pairs: Table) -> Both:
     return share * mass_2, share * mass_1
 
 
-#: Median and log-standard deviation of the gap from SD and eq. (16) over the exact one: 91 pairs of
-#: periods from 0.3 to 4 s at 5 % damping under 14 broad-band records.
-SD_MEDIAN, SD_DISPERSION = 0.97, 0.14
-
 #: Pairs times nodes that are computed together: every array stays below 256 kB.
 SAMPLES = 32_768
 

@@ -3,8 +3,8 @@ Pairs under a ShakeMap: motion at their places, and rows of pairs without a stat
 
 A map gives pseudo-spectral acceleration at 5 % damping and few periods. The radius is its spectral
 displacement, with no factor for PER: PER is never below SD, but how far above it depends on the
-record, which a map does not have, and on broad-band records the gap from SD and eq. (16) is within
-a log-standard deviation of 0.14 of the exact one (median 0.97), that from PER within 0.35 (1.14).
+record, which a map does not have, and the gap from SD and eq. (16) is nearer to the exact one than
+that from PER (`per_obspy.pounding.reliability`).
 Other dampings are reached by the factor of EN 1998-1. Flags of every row report these assumptions.
 """
 

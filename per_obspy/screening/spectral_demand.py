@@ -3,7 +3,7 @@ Demand and population of pairs by the spectral displacement of both buildings, w
 
 These are rungs 2 and 3 of the ladder of demands. There is no PER in a spectrum: the radius is the
 spectral displacement, because the gap from it and eq. (16) is the one that is known to be closest
-to the exact one (see ``SD_MEDIAN`` in ``population.py``).
+to the exact one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,19 +16,18 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.errors import Rejection
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
+from per_obspy.pounding.reliability import sd_error
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.estimates import single_hit_columns
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.population import (
-    SD_DISPERSION,
-    SD_MEDIAN,
     UncertainMotion,
     UncertainRadius,
     estimated_population,
 )
 from per_obspy.screening.ranking import state_columns
 from per_obspy.screening.station_motion import LogSpectra
-from per_obspy.screening.uncertain_motion import pair_motion
+from per_obspy.screening.uncertain_motion import likely_oscillators, pair_motion
 from per_obspy.screening.values import Both, Columns, IndexArray, both, pair_correlation, values
 
 
@@ -88,17 +87,18 @@ def spectral_uncertainty(table: pd.DataFrame, motion: SpectralMotion) -> Uncerta
     Return the uncertain motion of pairs with their ``correlation``.
 
     It is uncertain once for both buildings, with the correlation of the residuals at both periods,
-    and the estimate differs from the exact demand by ``SD_DISPERSION``.
+    and the estimate differs from the exact demand by its error (`sd_error`).
     """
     radii, periods = spectral_radii(table, motion), both(table, "period")
     nothing = np.zeros_like(periods[0])
     _, log_std = pair_motion(radii, (nothing, nothing), motion.log_std, periods)
     # medians of which the critical gap is right
+    error = sd_error(*likely_oscillators(table))
     first, second = (
-        UncertainRadius(radius / SD_MEDIAN, nothing, period, damping)
+        UncertainRadius(radius / error.median, nothing, period, damping)
         for radius, period, damping in zip(radii, periods, both(table, "damping"), strict=True)
     )
-    deviation = np.hypot(log_std, SD_DISPERSION)
+    deviation = np.hypot(log_std, error.log_std)
     return UncertainMotion(first, second, values(table, "correlation"), deviation, motion.row)
 
 

@@ -22,6 +22,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation, Screening
 from per_obspy.pounding.critical_gap import critical_gap
+from per_obspy.pounding.reliability import per_error
 from per_obspy.screening.exact import can_yield
 from per_obspy.screening.population import UncertainMotion, UncertainRadius
 from per_obspy.screening.station_motion import (
@@ -37,6 +38,7 @@ from per_obspy.screening.values import (
     Table,
     at_contact,
     both,
+    oscillators,
     pair_correlation,
     values,
 )
@@ -64,9 +66,9 @@ class SiteDemand(NamedTuple):
         site over that at the record, from the median motion between the stations.
     ln_field : ndarray
         ln of the demand in m that the motion between the stations lets expect: critical gap by PER
-        and eq. (16) at the site over ``model_median``. Radii are RotD50 where the azimuth of the
-        pair is known, because directions of shaking change from place to place, else those along
-        the worst azimuth of the record.
+        and eq. (16) at the site over its error (`per_error`). Radii are RotD50 where the azimuth of
+        the pair is known, because directions of shaking change from place to place, else those
+        along the worst azimuth of the record.
     field_log_std : ndarray
         Part of the deviation: of the pair's ln PER at the site, with Student's factor.
     transfer_log_std : ndarray
@@ -102,7 +104,7 @@ def site_demand(station: StationMotion, table: Table, screening: Screening) -> S
     return SiteDemand(
         weight=weight,
         ln_ratio=ln_ratio,
-        ln_field=ln_field_demand(station, table, screening),
+        ln_field=ln_field_demand(station, table),
         field_log_std=field_log_std,
         transfer_log_std=transfer_log_std,
         log_std=np.hypot(field_log_std, transfer_log_std),
@@ -163,7 +165,7 @@ def motion_at_site(table: Table) -> tuple[Both, Both]:
     return ratios, (np.nan_to_num(std_1), np.nan_to_num(std_2))
 
 
-def ln_field_demand(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
+def ln_field_demand(station: StationMotion, table: Table) -> FloatArray:
     """
     Return ln of the expected demand at the site, m, from the motion between stations.
 
@@ -176,8 +178,21 @@ def ln_field_demand(station: StationMotion, table: Table, screening: Screening) 
     # the estimate is larger than the exact demand in the median
     gap = critical_gap(radius_1, radius_2, pair_correlation(table))
     with np.errstate(divide="ignore"):
-        ln_demand: FloatArray = np.log(gap / screening.model_median)
+        ln_demand: FloatArray = np.log(gap / per_error(*oscillators(table)).median)
     return ln_demand
+
+
+def likely_oscillators(table: Table) -> tuple[FloatArray, ...]:
+    """
+    Return period, s, and damping of both buildings, their periods as far apart as is likely.
+
+    Between uncertain periods the root mean square of ln(T2 / T1) of the population is taken: equal
+    medians do not make equal periods.
+    """
+    period_1, damping_1, period_2, damping_2 = oscillators(table)
+    spread = np.hypot(*both(table, "period_log_std"))
+    apart = np.hypot(np.log(period_2 / period_1), spread)
+    return period_1, damping_1, period_1 * np.exp(apart), damping_2
 
 
 def _stored_radius(station: StationMotion, table: Table, i: int, row: IndexArray) -> FloatArray:
@@ -293,12 +308,13 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
 
     Its rows are those of the stored PER of the station. Where the exact demand decides the radii
     are those of PER, without the error of an estimate; elsewhere the estimate's median and
-    deviation over the exact one are those of the settings.
+    deviation over the exact one are those of `per_error`, and of yielding buildings the settings'.
     """
     exact, linearized = is_exact(table), np.asarray(table["demand_rule"] == "linearized")
     # the median of the estimate over the exact demand is taken off the radius
-    medians = screening.linearized_median, screening.model_median
-    bias = np.where(exact, 1.0, np.where(linearized, *medians))
+    elastic = per_error(*likely_oscillators(table))
+    bias = np.where(linearized, screening.linearized_median, elastic.median)
+    bias = np.where(exact, 1.0, bias)
     ratios, _ = motion_at_site(table)
     first, second = (
         UncertainRadius(
@@ -311,7 +327,7 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     )
     # by the motion of both buildings, and by the error of an estimate
     _, pair_log_std = pair_at_site(table)
-    at_record = np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
+    at_record = np.where(linearized, screening.linearized_dispersion, elastic.log_std)
     model_log_std = estimate_log_std(table, at_record, screening.interpolation)
     return UncertainMotion(
         first,

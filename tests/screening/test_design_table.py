@@ -9,6 +9,7 @@ from scipy.special import ndtr
 from per_obspy.config import Building, Codes, Screening
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
+from per_obspy.pounding.reliability import sd_error
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.design import DESIGN, LEADING, DesignSpectrum, design_table
@@ -45,7 +46,7 @@ def test_the_demand_by_hand():
     squared_gap = 0.05**2 + 0.1**2 - 2 * row["correlation"] * 0.05 * 0.1
     assert_allclose(row["demand"] ** 2, squared_gap, rtol=1e-10)
     assert 0.0 < row["correlation"] < 0.05
-    # a gap of 0.9 of the demand, of which the estimate is uncertain by 0.14
+    # a gap of 0.9 of the demand, of which the estimate is uncertain
     assert row["state"] == "likely"
     assert_allclose(row["demand_ratio"], 0.1 / row["demand"], rtol=1e-12)
     assert row["impact_velocity"] > 0
@@ -83,14 +84,14 @@ def test_equal_buildings_are_safe_only_if_their_periods_are_known():
 
 
 def test_a_gap_close_to_the_demand_is_in_between():
-    # the estimate errs by 0.14 in its logarithm: a gap 10 % above the demand is pounded across in a
-    # third of cases
+    # the estimate errs: a gap 10 % above the demand is pounded across in a third of cases
     plain = {"participation_1": 1.0, "participation_2": 1.0, "damping_1": 0.05, "damping_2": 0.05}
     demand = _table(_pairs(**plain)).loc["p0", "demand"]
+    error = sd_error(0.5, 0.05, 1.0, 0.05)
     table = _table(_pairs(gap=demand * np.array([0.9, 1.1, 3.0]), **plain))
     assert table.loc[["p0", "p1", "p2"], "state"].tolist() == ["likely", "possible", "no"]
     # the logarithm of the gap over the estimate's median, in standard deviations of the estimate
-    expected = ndtr(-np.log(np.array([0.9, 1.1, 3.0]) * 0.97) / 0.14)
+    expected = ndtr(-np.log(np.array([0.9, 1.1, 3.0]) * error.median) / error.log_std)
     assert_allclose(table.loc[["p0", "p1", "p2"], "probability"], expected, atol=1e-9)
 
 
@@ -103,7 +104,9 @@ def test_unknown_periods_widen_the_probability_towards_one_half():
     random = np.random.default_rng(8)
     period = np.array([[0.5], [1.0]]) * np.exp(0.3 * random.normal(size=(2, 100_000)))
     demand = critical_gap(*(0.1 * period), ddc_correlation(period[0], 0.05, period[1], 0.05))
-    pounded = demand / 0.97 * np.exp(0.14 * random.normal(size=100_000)) > 0.12
+    error = sd_error(0.5, 0.05, 0.5 * np.exp(np.hypot(np.log(2.0), np.hypot(0.3, 0.3))), 0.05)
+    scatter = np.exp(error.log_std * random.normal(size=100_000))
+    pounded = demand / error.median * scatter > 0.12
     # 128 quasi-random nodes integrate the probability of a gap near the middle to about 0.01
     assert probability == pytest.approx(pounded.mean(), abs=0.02)
 
@@ -112,7 +115,9 @@ def test_a_spectrum_leaves_the_error_of_the_estimate_and_of_uncertain_dampings()
     # building 2 moves 1e-4 of its SD: the critical gap is the SD of building 1, 0.1 m
     still = {"participation_1": 1.0, "participation_2": 1e-4, "period_1": 1.0, "damping_1": 0.05}
     table = _table(_pairs(**still, damping_2=0.05, gap=[0.08, 0.1, 0.13]))
-    expected = ndtr(np.log(0.1 / 0.97 / np.array([0.08, 0.1, 0.13])) / 0.14)
+    error = sd_error(1.0, 0.05, table.loc["p0", "period_2"], 0.05)
+    median = 0.1 / error.median
+    expected = ndtr(np.log(median / np.array([0.08, 0.1, 0.13])) / error.log_std)
     found = table.loc[["p0", "p1", "p2"], "probability"]
     assert_allclose(found, expected, atol=1e-3)
     # a radius that falls as the root of the damping: half its log-standard deviation
@@ -122,7 +127,7 @@ def test_a_spectrum_leaves_the_error_of_the_estimate_and_of_uncertain_dampings()
     )
     pairs = _pairs(**still, damping_2=0.05, gap=0.13, damping_log_std_1=0.4)
     widened = design_table(falling, pairs, Building(), Screening())["probability"].iloc[0]
-    expected = ndtr(np.log(0.1 / 0.97 / 0.13) / np.hypot(0.2, 0.14))
+    expected = ndtr(np.log(median / 0.13) / np.hypot(0.2, error.log_std))
     # 128 nodes of one dimension
     assert_allclose(widened, expected, atol=5e-3)
 

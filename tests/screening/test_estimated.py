@@ -6,13 +6,11 @@ from screening_samples import make_pairs, make_station
 
 import per_obspy
 from per_obspy.config import Screening
+from per_obspy.pounding.reliability import per_error
 from per_obspy.screening.exact_population import record_population
 from per_obspy.screening.station_motion import station_motion, stored_log
 from per_obspy.screening.uncertain_motion import period_correlation
 from per_obspy.screening.yielding import linearized_columns
-
-#: Of the critical gap by PER over the exact one.
-MEDIAN = Screening().model_median
 
 
 def _row(station, **row):
@@ -48,7 +46,9 @@ def test_an_estimate_is_even_where_the_gap_is_the_exact_one_of_its_median():
     given = {"damping_1": 0.05, "damping_2": 0.05}
     row = _row(station, **given)
     assert row["demand_rule"] != "exact"
-    table, even, _ = _with_motion(station, [{**given, "gap": row["demand"] / MEDIAN}])
+    table, even, _ = _with_motion(
+        station, [{**given, "gap": row["demand"] / per_error(1.0, 0.05, 0.6, 0.05).median}]
+    )
     assert table["demand_rule"][0] == row["demand_rule"]
     assert_allclose(even, 0.5, atol=1e-9)
 
@@ -115,8 +115,11 @@ def test_equal_derived_buildings_against_monte_carlo():
     period_1, damping_1, radius_1 = _drawn_oscillators(station, row, 1, count, random)
     period_2, damping_2, radius_2 = _drawn_oscillators(station, row, 2, count, random)
     correlation = per_obspy.ddc_correlation(period_1, damping_1, period_2, damping_2)
-    exact = per_obspy.critical_gap(radius_1, radius_2, correlation) / MEDIAN
-    critical = exact * np.exp(0.35 * random.normal(size=count))
+    # equal medians, whose ratio has a log-standard deviation of that of both
+    apart = np.exp(np.hypot(row["period_log_std_1"], row["period_log_std_2"]))
+    error = per_error(1.0, 0.05, apart, 0.05)
+    exact = per_obspy.critical_gap(radius_1, radius_2, correlation) / error.median
+    critical = exact * np.exp(error.log_std * random.normal(size=count))
     # 128 quasi-random nodes in four dimensions against 40 000 samples (standard error 0.0025)
     assert_allclose(row["probability"], np.mean(critical > gap), atol=0.02)
 
@@ -206,7 +209,8 @@ def test_radii_at_the_site_against_monte_carlo():
     random, count = np.random.default_rng(5), 200_000
     radii = _drawn_radii(row, ratios, stds, count, random)
     name = "correlation_record" if row["demand_rule"] == "per_record" else "correlation"
-    critical = per_obspy.critical_gap(*radii, row[name]) / MEDIAN
-    closed = critical * np.exp(0.35 * random.normal(size=count)) > gap
+    error = per_error(1.0, 0.05, 0.6, 0.05)
+    critical = per_obspy.critical_gap(*radii, row[name]) / error.median
+    closed = critical * np.exp(error.log_std * random.normal(size=count)) > gap
     # standard error of 200 000 samples: 0.0011
     assert_allclose(probability[0], np.mean(closed), atol=0.015)

@@ -5,7 +5,9 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
+from screening_samples import make_pairs
 
+import per_obspy
 from per_obspy.config import Screening, States
 from per_obspy.screening.ranking import (
     KEYS,
@@ -90,3 +92,15 @@ def test_a_likelier_pair_never_has_a_less_likely_state(chances):
     states = pounding_state(np.sort(np.array(chances)), Screening().states)
     order = [STATES.index(state) for state in states]
     assert_array_equal(order, sorted(order, reverse=True))
+
+
+def test_no_gap_between_learned_outlines_is_a_no(station):
+    # would catch: a state by the probability alone, a flag without the state
+    wide = {"gap": 3.0, "gap_std": 0.1}
+    rows = [wide, {**wide, "gap_std_source": "learned"}, {"gap": 0.0, "gap_std_source": "learned"}]
+    table = per_obspy.risk_table(station, make_pairs(rows)).set_index("pair_id").sort_index()
+    assert table["state"].tolist() == ["no", "unlikely", "yes"]
+    flagged = table["flags"].str.split().map(lambda names: "learned_outlines" in names)
+    assert flagged.tolist() == [False, True, True]
+    # nothing else is changed
+    assert table["probability"].iloc[0] == table["probability"].iloc[1]

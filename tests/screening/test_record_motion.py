@@ -6,7 +6,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import table_of
 
 from per_obspy.config import Screening
-from per_obspy.screening.uncertain_motion import pair_motion, record_motion
+from per_obspy.pounding.reliability import per_error
+from per_obspy.screening.uncertain_motion import (
+    likely_oscillators,
+    pair_motion,
+    record_motion,
+)
 from per_obspy.screening.values import at_contact, both
 
 #: One exact demand, one estimate outside the usable periods, one of derived periods, and one of
@@ -39,12 +44,13 @@ def table(station):
 
 def test_the_median_of_the_estimate_is_taken_off_the_radius(record, table):
     # would catch: one bias for elastic and linearized estimates, a radius of the oscillator
-    screening = Screening(model_median=2.0, linearized_median=5.0)
+    screening = Screening(linearized_median=5.0)
+    error = per_error(*likely_oscillators(table)).median
     motion = record_motion(record, table, screening)
     shares = both(table, "participation")
     for i, radius in enumerate((motion.first, motion.second), start=1):
         # where the exact demand decides there is no error of an estimate
-        bias = np.where(table["demand_rule"] == "exact", 1.0, 2.0)
+        bias = np.where(table["demand_rule"] == "exact", 1.0, error)
         elastic = shares[i - 1] * table[f"per_{i}"] / bias
         equivalent = shares[i - 1] * table[f"equivalent_per_{i}"] / 5.0
         assert_allclose(radius.radius[:YIELDING], elastic[:YIELDING], rtol=1e-12)
@@ -66,21 +72,22 @@ def test_oscillators_and_correlation_are_those_that_decide(record, table):
 
 
 def test_errors_of_the_model_are_those_of_the_estimate(record, table):
-    screening = Screening(model_dispersion=0.31, linearized_dispersion=0.62)
-    motion = record_motion(record, table, screening)
-    assert motion.log_std.tolist() == [0.0, 0.31, 0.31, 0.62]
+    motion = record_motion(record, table, Screening(linearized_dispersion=0.62))
+    error = per_error(*likely_oscillators(table)).log_std
+    assert motion.log_std.tolist() == [0.0, error[GIVEN], error[DERIVED], 0.62]
 
 
 def test_the_motion_of_the_site_is_that_of_the_table(record, table):
     at_site = table.assign(**SITE)
-    motion = record_motion(record, at_site, Screening(model_dispersion=0.3))
+    motion = record_motion(record, at_site, Screening())
     assert set(motion.first.ln_ratio) == {0.4}
     assert set(motion.second.ln_ratio) == {-0.2}
     # the pair's own deviation, with the error of an estimate
+    error = per_error(*likely_oscillators(table)).log_std
     ratios, stds = both(at_site, "ln_per_ratio"), both(at_site, "ln_per_std")
     _, log_std = pair_motion(at_contact(table, "per"), ratios, stds, both(table, "period"))
     assert motion.log_std[EXACT] == log_std[EXACT]
-    assert_allclose(motion.log_std[DERIVED], np.hypot(log_std[DERIVED], 0.3), rtol=1e-12)
+    assert_allclose(motion.log_std[DERIVED], np.hypot(log_std[DERIVED], error[DERIVED]), rtol=1e-12)
 
 
 def test_without_a_field_of_stations_the_site_has_the_motion_of_the_record(record, table):

@@ -14,6 +14,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
+from per_obspy.pounding.reliability import sd_error
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.columns import FLAGS, ORDER
 from per_obspy.screening.shakemap import shakemap_rows
@@ -162,13 +163,15 @@ def test_equal_periods_are_certain_only_if_they_are_given():
 
 def test_the_deviation_of_the_map_makes_the_probability():
     # the larger building beside one that hardly moves: ln of the gap is normal, its deviation that
-    # of the map and of the estimate, its median that of the estimate over 0.97
+    # of the map and of the estimate, its median that of the estimate over its error
     still = {**GIVEN, "participation_2": 1e-4, "period_1": 1.0}
-    demand = _rows([still])[0]["demand"].iloc[0]
-    gaps = demand / 0.97 * np.array([0.5, 1.0, 1.7])
+    row = _rows([still])[0].iloc[0]
+    error = sd_error(1.0, row["damping_1"], row["period_2"], row["damping_2"])
+    median = row["demand"] / error.median
+    gaps = median * np.array([0.5, 1.0, 1.7])
     for log_std in (0.3, 0.7):
         table, _ = _rows([{**still, "gap": gap} for gap in gaps], make_map(log_std=log_std))
-        expected = ndtr(np.log(demand / 0.97 / gaps) / np.hypot(log_std, 0.14))
+        expected = ndtr(np.log(median / gaps) / np.hypot(log_std, error.log_std))
         # the still building counts 1e-4
         assert_allclose(table["probability"], expected, atol=1e-3)
         assert "assumed" not in table["flags"].iloc[0]
@@ -200,11 +203,11 @@ def _drawn_radius(row, i, count, random):
     log_sd = np.log(np.array([8.0, 4.0, 1.0]) * (PERIODS / 2 / np.pi) ** 2)
     sd = np.exp(np.interp(np.log(period), np.log(PERIODS), log_sd))
     damped = sd * np.sqrt(10.0 / (5.0 + 100.0 * row[f"damping_{i}"]))
-    return period, row[f"participation_{i}"] * damped / 0.97
+    return period, row[f"participation_{i}"] * damped
 
 
 def test_derived_periods_against_monte_carlo():
-    # 0.97, 0.14 and the code's damping by hand; would catch a deviation of the map that is lost or
+    # the code's damping by hand; would catch a deviation of the map that is lost or
     # taken twice
     shakemap = make_map(log_std=0.5)
     gap = 0.8 * _root_of_squares(_rows([DERIVED], shakemap)[0].iloc[0])
@@ -215,7 +218,11 @@ def test_derived_periods_against_monte_carlo():
     period_2, radius_2 = _drawn_radius(row, 2, count, random)
     # periods of these two agree so well that their errors of motion are nearly one
     gaps = critical_gap(radius_1, radius_2, ddc_correlation(period_1, 0.05, period_2, 0.03))
-    closed = np.log(gaps / gap) + np.hypot(0.14, 0.5) * motion > 0
+    # the medians and both deviations make the ratio of the periods
+    ln_ratio = np.log(row["period_1"] / row["period_2"])
+    apart = np.sqrt(ln_ratio**2 + row["period_log_std_1"] ** 2 + row["period_log_std_2"] ** 2)
+    error = sd_error(1.0, 0.05, np.exp(apart), 0.03)
+    closed = np.log(gaps / error.median / gap) + np.hypot(error.log_std, 0.5) * motion > 0
     # 128 quasi-random nodes (0.01); a deviation of the motion that is 0.9 of 0.5 changes the chance
     # by 0.01
     assert_allclose(row["probability"], closed.mean(), atol=0.02)

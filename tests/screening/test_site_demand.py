@@ -8,6 +8,7 @@ from screening_samples import make_pairs, table_of
 
 import per_obspy
 from per_obspy.config import Interpolation, Screening
+from per_obspy.pounding.reliability import per_error
 from per_obspy.screening.uncertain_motion import (
     demand_correlation,
     estimate_log_std,
@@ -75,23 +76,24 @@ def test_the_shift_of_the_record_is_that_of_the_pairs_radii(record, table):
 
 
 def test_the_field_lets_expect_the_critical_gap_of_its_radii(record, station, table):
-    # at stored periods and damping, by hand: eq. (15) and (16) of RotD50 at the site over 1.16
+    # at stored periods and damping, by hand: eq. (15) and (16) of RotD50 at the site over its error
     periods = station["period"].to_numpy()[[20, 40]]
     stored = table.assign(period_1=periods[0], period_2=periods[1], damping_1=0.05, damping_2=0.05)
     stored = stored.assign(**SITE, participation_1=1.0, participation_2=0.5)
     rotd50 = station["per_rotd50"].sel(damping=0.05, period=periods).to_numpy().astype(float)
     radius_1, radius_2 = rotd50[0] * np.exp(0.4), 0.5 * rotd50[1] * np.exp(-0.2)
     correlation = float(per_obspy.ddc_correlation(periods[0], 0.05, periods[1], 0.05))
+    error = per_error(periods[0], 0.05, periods[1], 0.05).median
     gap = np.sqrt(radius_1**2 + radius_2**2 - 2.0 * correlation * radius_1 * radius_2)
     site = site_demand(record, stored, SCREENING)
     # spectra are stored in float32
-    assert_allclose(np.exp(site.ln_field), gap / 1.16, rtol=1e-6)
+    assert_allclose(np.exp(site.ln_field), gap / error, rtol=1e-6)
     # of an unknown azimuth the radii are those along the record's worst
     along = station["per_azimuthal"].sel(azimuth=40.0, damping=0.05, period=periods).to_numpy()
     radius_1, radius_2 = along[0] * np.exp(0.4), 0.5 * along[1] * np.exp(-0.2)
     gap = np.sqrt(radius_1**2 + radius_2**2 - 2.0 * correlation * radius_1 * radius_2)
     unknown = site_demand(record, stored.assign(azimuth=np.nan, azimuth_used=40.0), SCREENING)
-    assert_allclose(np.exp(unknown.ln_field), gap / 1.16, rtol=1e-6)
+    assert_allclose(np.exp(unknown.ln_field), gap / error, rtol=1e-6)
 
 
 def test_known_and_unknown_azimuths_of_one_block_do_not_mix(record, table):

@@ -9,6 +9,7 @@ from per_obspy.config import Building, Screening
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
+from per_obspy.pounding.reliability import sd_error
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.spectral_demand import (
     SpectralMotion,
@@ -16,7 +17,8 @@ from per_obspy.screening.spectral_demand import (
     spectral_uncertainty,
 )
 from per_obspy.screening.station_motion import LogSpectra
-from per_obspy.screening.values import both
+from per_obspy.screening.uncertain_motion import likely_oscillators
+from per_obspy.screening.values import both, oscillators
 
 #: SD of both oscillators, m, without deviation, whatever period and damping.
 SD = np.full(2, 0.1), np.full(2, 0.2)
@@ -69,7 +71,10 @@ def test_state_and_class_are_those_of_the_population_whatever_was_derived(pairs)
 def test_the_radius_of_the_population_has_no_bias(pairs):
     table = spectral_rows(pairs, MOTION, Screening())
     motion = spectral_uncertainty(table, MOTION)
-    assert_allclose(motion.second.radius, RADII[1] / 0.97, rtol=1e-12)
+    # given periods of 1 and 0.6 s; derived ones are as far apart as their deviations make likely
+    error = sd_error(*likely_oscillators(table))
+    assert error.median[0] == sd_error(*oscillators(table)).median[0] > error.median[1]
+    assert_allclose(motion.second.radius, RADII[1] / error.median, rtol=1e-12)
     assert_array_equal(motion.second.period, pairs["period_2"])
     assert not motion.second.ln_ratio.any()
-    assert_allclose(motion.log_std, 0.14, rtol=1e-12)
+    assert_allclose(motion.log_std, error.log_std, rtol=1e-12)

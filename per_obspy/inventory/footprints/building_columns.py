@@ -19,7 +19,14 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, did_you_mean, printable
 from per_obspy.inventory.cells import NOTES, is_number, read_numbers
-from per_obspy.inventory.footprints.sources import Source, converted, source_of
+from per_obspy.inventory.footprints.sources import (
+    ORIGINS,
+    OUTLINE_SOURCE,
+    Source,
+    converted,
+    outline_origins,
+    source_of,
+)
 from per_obspy.inventory.schema import COLUMNS
 
 #: Quantities of a building that a layer may give, by their names in the schema.
@@ -105,6 +112,12 @@ def schema_columns(
     is_empty = len(table) > 0 and (_has_no_size(table) & is_understood).all()
     if is_empty or not set(SIZES) & set(table):
         raise CatalogError(file, _no_size(table, attributes, source))
+    origins = outline_origins(cells, source)
+    if (origins != "drawn").any():
+        table[OUTLINE_SOURCE] = origins
+    if "height" in table and "height" not in (given or {}):
+        of_heights = pd.Series(source.heights, table.index) if source.heights else origins
+        table = _with_height_errors(table, of_heights)
     # Missing heights from the classes of the layer
     if source.class_column is not None:
         classes = cells.get(source.class_column, pd.Series("", cells.index))
@@ -115,6 +128,18 @@ def schema_columns(
     if any(notes):
         table[NOTES] = notes
     return table.join(cells[[name for name in source.carried if name in cells]])
+
+
+def _with_height_errors(table: pd.DataFrame, origins: pd.Series) -> pd.DataFrame:
+    """Return a table with the deviation of heights that were learned from images."""
+    errors = origins.map({name: origin.height_std for name, origin in ORIGINS.items()})
+    learned = (errors > 0.0) & (table["height"] > 0.0)
+    if not learned.any():
+        return table
+    highest = COLUMNS["height_log_std_1"].high
+    deviation = np.sqrt(np.log1p((errors / table["height"]) ** 2)).clip(upper=highest)
+    given = table.get("height_log_std", pd.Series(np.nan, table.index))
+    return table.assign(height_log_std=given.mask(learned & given.isna(), deviation))
 
 
 def _named_columns(

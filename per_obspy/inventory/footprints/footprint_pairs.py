@@ -8,7 +8,7 @@ file that goes with the pairs, which refer to it by ``building_id_1`` and ``buil
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,12 +29,9 @@ from per_obspy.inventory.footprints.building_columns import building_columns
 from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, read_layer, transformed
 from per_obspy.inventory.footprints.neighbours import IntArray, Outlines, neighbours
 from per_obspy.inventory.footprints.raw_layer import Geometries
+from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
-
-#: Standard deviation of a gap between drawn outlines without a known one, m: 0.2 mm, about the
-#: finest that a plan shows, at a scale of 1:500. It is assumed, not measured.
-DRAWN = 0.1
 
 #: Share of the smaller footprint that may be covered by both: digitised party walls cross by
 #: centimetres.
@@ -119,7 +116,8 @@ def pairs_from_footprints(
         Name of the layer, for files that have several.
     gap_std : float, optional
         Standard deviation of the gaps between drawn outlines, m, touching ones too; 0 where
-        outlines are exact. If not given, 0.1 m is assumed and marked in ``gap_std_source``.
+        outlines are exact. If not given, it is assumed by the origin of both outlines, and marked
+        in ``gap_std_source``.
     columns : mapping of str to str, optional
         Name of a building's quantity in the schema -> the layer's column, such as ``{"height":
         "altura"}``, where names are not recognised.
@@ -158,9 +156,9 @@ def find_footprint_pairs(
     """Find pairs as :func:`pairs_from_footprints` does, and keep the buildings."""
     largest = checks.number("distance", distance, checks.positive)
     _require_within("distance", largest, "gap")
-    deviation = DRAWN if gap_std is None else gap_std
-    deviation = checks.number("gap_std", deviation, checks.not_negative)
-    _require_within("gap_std", deviation, "gap_std")
+    if gap_std is not None:
+        gap_std = checks.number("gap_std", gap_std, checks.not_negative)
+        _require_within("gap_std", gap_std, "gap_std")
     # Footprints, without those that repeat another
     source = str(path)
     buildings, rejected = _usable_buildings(path, layer, columns or {})
@@ -170,8 +168,7 @@ def find_footprint_pairs(
         raise CatalogError(source, f"no two footprints lie within {largest:g} m")
     pairs = _with_names(pairs, buildings.table, outlines.meridian)
     # Pairs, checked as if they came from a file
-    drawn = {"gap_std": deviation, "gap_std_source": "assumed" if gap_std is None else "given"}
-    table, unusable = _checked_table(pairs, buildings.table, drawn, source)
+    table, unusable = _checked_table(pairs, buildings.table, gap_std, source)
     table.attrs["rejected"] = Rejections((*rejected, *unusable))
     return FootprintPairs(table, buildings, _middle(pairs, buildings.table, unusable))
 
@@ -223,14 +220,14 @@ def _with_names(pairs: pd.DataFrame, buildings: pd.DataFrame, meridian: float) -
 
 
 def _checked_table(
-    pairs: pd.DataFrame, buildings: pd.DataFrame, drawn: Mapping[str, Any], source: str
+    pairs: pd.DataFrame, buildings: pd.DataFrame, gap_std: float | None, source: str
 ) -> tuple[pd.DataFrame, list[Rejection]]:
     """Return the pair table, and a rejection for each pair that cannot be used."""
     columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
     for start in range(0, len(pairs), CHUNK):
         part = _with_positions(pairs.iloc[start : start + CHUNK])
         part = _with_buildings(part, buildings)
-        checked = _checked_block(part.assign(**drawn), source, rejected)
+        checked = _checked_block(_with_deviation(part, gap_std), source, rejected)
         for name, column in checked.items():
             columns.setdefault(str(name), []).append(column.copy())
     # Joined column by column, so that no second copy of the whole table is in memory
@@ -244,6 +241,23 @@ def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
     inside = {"position": inside_1 & inside_2, "position_1": inside_1, "position_2": inside_2}
     words = dict(zip((False, True), POSITIONS, strict=True))
     return pairs.assign(**{name: each.map(words) for name, each in inside.items()})
+
+
+def _with_deviation(pairs: pd.DataFrame, gap_std: float | None) -> pd.DataFrame:
+    """Return pairs with the deviation of their gaps: the given one, or that of the outlines."""
+    word = "assumed" if gap_std is None else "given"
+    # Of two origins the less accurate one counts
+    deviation = np.full(len(pairs), ORIGINS["drawn"].gap_std)
+    learned = np.zeros(len(pairs), dtype=bool)
+    for i in (1, 2):
+        if f"{OUTLINE_SOURCE}_{i}" in pairs:
+            origin = pairs[f"{OUTLINE_SOURCE}_{i}"]
+            own = origin.map({name: each.gap_std for name, each in ORIGINS.items()})
+            deviation, learned = np.maximum(deviation, own), learned | origin.isin(LEARNED)
+    return pairs.assign(
+        gap_std=deviation if gap_std is None else gap_std,
+        gap_std_source=np.where(learned, "learned", word),
+    )
 
 
 def _checked_block(part: pd.DataFrame, source: str, rejected: list[Rejection]) -> pd.DataFrame:

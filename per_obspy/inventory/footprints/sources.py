@@ -19,6 +19,39 @@ from per_obspy.inventory.cells import plain_numbers, read_numbers
 from per_obspy.inventory.footprints.json_buildings import LENGTH_UNIT
 
 
+class Origin(NamedTuple):
+    """Accuracy of outlines, and of heights from the same images."""
+
+    #: Standard deviation of gaps between two of them, m. Their median is the gap as it is drawn: an
+    #: offset of the images moves neighbours alike.
+    gap_std: float
+    #: Standard deviation of heights, m; 0 of measured ones.
+    height_std: float = 0.0
+
+
+#: How outlines were made -> their accuracy. Reasoned, if nothing else is said:
+#: drawn: 0.2 mm on a plan of 1:500, about the finest that it shows; also those of unknown origin.
+#: traced by hand from images: places are off by 3 m (OpenStreetMap in Lombardy, Brovelli & Zamboni
+#: 2018) to 4 m (in Munich), most of it common to neighbours. Measured: the root mean square of the
+#: drawn gaps of neighbours that touch by a survey is 0.15 to 0.5 m (docs/inventories.md).
+#: learned from images of 0.3 to 0.5 m: two to three pixels at both walls, and eaves; heights: one
+#: storey.
+#: coarse, learned from images of 3 m: GlobalBuildingAtlas, whose heights have root mean square
+#: errors of 1.5 to 8.9 m by continent (Zhu et al. 2025), here their geometric mean.
+ORIGINS = {
+    "drawn": Origin(0.1),
+    "traced": Origin(0.3),
+    "learned": Origin(1.0, 3.0),
+    "coarse": Origin(2.0, 3.7),
+}
+
+#: Origins whose gaps show no pair to be safe.
+LEARNED = ("learned", "coarse")
+
+#: Column of buildings with the origin of their outlines, where it is not drawn.
+OUTLINE_SOURCE = "outline_source"
+
+
 class Source(NamedTuple):
     """Names and codes of one source, as ``sources.toml`` explains them."""
 
@@ -30,6 +63,11 @@ class Source(NamedTuple):
     codes: tuple[str, ...] = ()
     #: Code -> structural system of the schema.
     systems: Mapping[str, str] = {}
+    outlines: str = "drawn"
+    origin_column: str = ""
+    #: Word -> origin of outlines.
+    origins: Mapping[str, str] = {}
+    heights: str = ""
 
 
 @cache
@@ -40,8 +78,23 @@ def sources() -> tuple[Source, ...]:
     for entry in table["source"]:
         systems = entry.pop("systems", {})
         by_code = {code: system for system, codes in systems.items() for code in codes}
-        read.append(Source(**entry, systems=by_code))
+        origins = entry.pop("origins", {name: [name] for name in ORIGINS})
+        by_word = {word: origin for origin, words in origins.items() for word in words}
+        read.append(Source(**entry, systems=by_code, origins=by_word))
     return tuple(read)
+
+
+def outline_origins(cells: pd.DataFrame, source: Source) -> pd.Series:
+    """Return how the outline of each building was made, one of ``ORIGINS``."""
+    if source.origin_column not in cells:
+        return pd.Series(source.outlines, cells.index)
+    texts = cells[source.origin_column].fillna("").astype(str).str.lower()
+
+    def origin(text: str) -> str:
+        words = [word for word in source.origins if word in text]
+        return source.origins[min(words, key=text.find)] if words else source.outlines
+
+    return texts.map({text: origin(text) for text in texts.unique()})
 
 
 def source_of(names: Iterable[str]) -> Source:

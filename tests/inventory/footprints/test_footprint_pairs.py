@@ -130,7 +130,7 @@ def test_drawn_gaps_and_touching_outlines_are_uncertain(write):
     assert set(pairs["gap_std_source"]) == {"given"}
     assert pairs_from_footprints(path, gap_std=0.0)["gap_std"].tolist() == [0.0, 0.0]
     # out of the range of the schema
-    for wrong in (-0.1, 1.5):
+    for wrong in (-0.1, 3.5):
         with pytest.raises(ValueError, match="gap_std"):
             pairs_from_footprints(path, gap_std=wrong)
 

@@ -10,6 +10,7 @@ import pyogrio
 import pytest
 import shapely
 from building_samples import OUTLINES, POINTS, Town, nsi, overture, small_town
+from numpy.testing import assert_allclose
 from screening_samples import make_station
 
 import per_obspy
@@ -231,4 +232,6 @@ def test_unknown_heights_of_microsoft_are_estimated_from_the_others():
     table = schema_columns(layer, "town")
     # three deviations of a median of 300
     assert abs(np.log(table["height"].to_numpy()[0] / 8.0)) < 3 * 1.25 * 0.4 / np.sqrt(300)
-    assert table["height_log_std"].notna().tolist() == [True] + [False] * 300
+    # known ones are as uncertain as heights from images, by 3 m, the estimated one as its class
+    assert_allclose(table["height_log_std"][1:], np.sqrt(np.log1p((3.0 / known) ** 2)), rtol=1e-12)
+    assert abs(table["height_log_std"][0] / 0.4 - 1.0) < 3 / np.sqrt(2 * 300)
