@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
-from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.inventory.schema import Column
 from per_obspy.inventory.suspicions import ODD
 from per_obspy.results.parts import bounded_database, joined_rows, joined_schema, text_columns
 from per_obspy.results.ranked_cells import count_values
@@ -25,14 +25,11 @@ from per_obspy.results.ranked_table import ROWS, RankedTable, ranked_table
 from per_obspy.results.table_files import (
     rounded_arrow,
     rounded_table,
-    write_columns,
     write_csv,
-    write_described,
     write_parquet,
     write_rejected,
 )
-from per_obspy.screening.codes import rule_columns
-from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.columns import column_table, csv_columns
 from per_obspy.screening.design import DESIGN
 
 
@@ -81,7 +78,7 @@ def write_risk(
     whole = ranked_schema(schema, facts)
     with written_whole(table) as part, written_whole(text) as lines:
         states, stations = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
-    write_columns(whole.names, columns)
+    write_csv(column_table(whole.names), columns)
     return RiskFiles(files, states, stations)
 
 
@@ -96,8 +93,8 @@ def _write_rows(
 ) -> tuple[Counter[str], Counter[str]]:
     """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
     states, stations, first = Counter[str](), Counter[str](), next(rows)
-    dictionaries = text_columns(first.schema)
-    text.write_text(header(first.column_names), encoding="utf-8")
+    dictionaries, short = text_columns(first.schema), csv_columns(first.column_names)
+    text.write_text(header(short), encoding="utf-8")
     with (
         bounded_database(table.parent) as database,
         pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
@@ -109,7 +106,8 @@ def _write_rows(
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
-                _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
+                worst = piece.select(short).slice(0, csv_rows - before)
+                _append_csv(database, rounded_arrow(worst), text)
     return states, stations
 
 
@@ -142,10 +140,13 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
 def write_worst(table: Path, rows: int, path: Path) -> None:
     """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
     with ranked_table([table]) as ranked:
-        write_worst_rows(ranked, rows, path, ranked.schema.names)
+        names = ranked.schema.names
+        write_worst_rows(ranked, rows, path, names, names)
 
 
-def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[str] = ()) -> None:
+def write_worst_rows(
+    table: RankedTable, rows: int, path: Path, columns: Sequence[str], own: Collection[str] = ()
+) -> None:
     """
     Write the worst rows of a ranked table as CSV.
 
@@ -157,12 +158,14 @@ def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[
         Largest number of rows.
     path : Path
         The file.
+    columns : sequence of str
+        Its columns.
     own : collection of str
         Columns of numbers that are rounded besides those that the package defines.
     """
     with bounded_database(path.parent) as database, written_whole(path) as part:
-        part.write_text(header(table.schema.names), encoding="utf-8")
-        for piece in table.ranked(rows):
+        part.write_text(header(columns), encoding="utf-8")
+        for piece in table.ranked(rows, columns):
             _append_csv(database, rounded_arrow(piece, own), part)
 
 
@@ -182,12 +185,9 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns() | {ODD: odd}
-    write_csv(rounded_table(table, own=known), text)
+    own = DESIGN | {ODD: odd}
+    write_csv(rounded_table(table[csv_columns(table)], own), text)
     write_parquet(table, whole)
-    # Columns of the pair table that are not computed here are carried through
-    carried = Column("", "", "", "carried through from the pair table")
-    described = (known.get(name, carried)._replace(name=name) for name in map(str, table))
-    write_described(described, columns)
+    write_csv(column_table(map(str, table), own, {}), columns)
     write_rejected(table.attrs["rejected"], rejected)
     return paths

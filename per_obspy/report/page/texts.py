@@ -106,7 +106,7 @@ ENGLISH: dict[str, str] = {
     "flags_all": "with all of these",
     "flags_none": "with none of these",
     "flags_chosen": "{label}: {count}",
-    "export_lacks": "The export has no column {names}: risk.csv has them.",
+    "export_lacks": "The export has no column {names}: risk.parquet has them.",
     "count": "{found} of {shown} pairs of this page ({all} screened)",
     "export": "export as CSV",
     "clear": "clear filters",

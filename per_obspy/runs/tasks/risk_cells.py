@@ -27,10 +27,11 @@ from per_obspy.results.ranked_cells import (
 )
 from per_obspy.results.ranked_table import ranked_table, table_files
 from per_obspy.results.risk import RiskFiles, ranked_schema, write_worst_rows
-from per_obspy.results.table_files import write_columns
+from per_obspy.results.table_files import write_csv
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.runs.tasks.parallel import Work, Workers, new_and_resumed
 from per_obspy.runs.tasks.parts import Part
+from per_obspy.screening.columns import column_table, csv_columns
 
 #: Folder in the results in which the dataset is made, and the name of the dataset.
 WORK, DATASET = "cells", "risk"
@@ -146,8 +147,9 @@ def write_texts(table: Sequence[Path], folder: Path, csv_rows: int) -> list[Path
     """Write ``risk.csv`` with the worst rows of a dataset, and ``risk.columns.csv``."""
     text, columns = folder / "risk.csv", folder / "risk.columns.csv"
     with ranked_table(table) as ranked:
-        write_worst_rows(ranked, csv_rows, text)
-        write_columns(ranked.schema.names, columns)
+        names = ranked.schema.names
+        write_worst_rows(ranked, csv_rows, text, csv_columns(names))
+        write_csv(column_table(names), columns)
     return [text, columns]
 
 

@@ -91,7 +91,7 @@ SPANISH: dict[str, str] = {
     "flags_all": "con todas estas",
     "flags_none": "sin ninguna de estas",
     "flags_chosen": "{label}: {count}",
-    "export_lacks": "A la exportación le falta la columna {names}: están en risk.csv.",
+    "export_lacks": "A la exportación le falta la columna {names}: están en risk.parquet.",
     "count": "{found} de {shown} pares de esta página ({all} evaluados)",
     "export": "exportar como CSV",
     "clear": "quitar filtros",
