@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
+from per_obspy.screening.ranking import UNKNOWN_STATE
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 if TYPE_CHECKING:
@@ -161,6 +162,8 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
+    if _text(pair, "state") == UNKNOWN_STATE:
+        lines.append("It is ranked by the gap that it needs, as if the buildings touched.")
     # A run has one probability, an ensemble perhaps that of a year too
     if math.isfinite(number(pair, "probability")):
         lines.append(f"Probability of contact: {chance_text(number(pair, 'probability'))}.")
@@ -193,6 +196,12 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
     if math.isfinite(impacts := number(pair, "impacts")):
         fastest = speed_text(number(pair, "impact_velocity_exact"))
         lines.append(f"In this record: {impacts:.0f} impacts, the fastest {fastest}.")
+        if impacts == 0 and expected > 0:
+            lines.append(
+                "The record alone, with the likeliest buildings, closes no gap. Class and rank "
+                "count every outcome of uncertain periods, dampings, gap and motion at the site: "
+                f"{chance_text(number(pair, 'probability'))} of them hit."
+            )
     if math.isfinite(growth := number(pair, "expected_amplification")):
         lines.append(f"Motion with pounding over motion without: {growth:.2f}.")
     return lines

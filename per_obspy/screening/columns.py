@@ -40,8 +40,8 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "rank",
             "",
-            "order of severity, 1 is the worst: by expected impact velocity, then "
-            "amplification, probability, importance",
+            "order of severity, 1 is the worst: by expected impact velocity, then amplification, "
+            "probability, importance; a pair of unknown gap as if its buildings touched",
         ),
         _text(
             "risk_class",
