@@ -6,6 +6,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
+from per_obspy.inventory.places import with_towns
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import UNKNOWN_STATE
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
@@ -209,7 +210,7 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _building_lines(pair: Mapping[str, Any]) -> list[str]:
     """Describe both buildings."""
-    lines = list[str]()
+    lines = _place_lines(pair)
     for i in (1, 2):
         facts = {
             "period {:.2f} s": number(pair, f"period_{i}"),
@@ -220,11 +221,23 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
         }
         # Sentences on known values only
         known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
-        name = _text(pair, f"building_id_{i}")
+        names = [_text(pair, f"{column}_{i}") for column in ("name", "building_id")]
+        name = ", ".join(dict.fromkeys(filter(None, names)))
         if known or name:
             title = f"Building {i} ({name_text(name)})" if name else f"Building {i}"
             lines.append(f"{title}: {', '.join(known)}.")
     return lines
+
+
+def _place_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Return where the pair is, with links to maps."""
+    east, north = number(pair, "longitude"), number(pair, "latitude")
+    if not (math.isfinite(east) and math.isfinite(north)):
+        return []
+    (place,) = with_towns([_text(pair, "place")], [east], [north])
+    at = f"{north:.5f},{east:.5f}"
+    osm = f"https://www.openstreetmap.org/?mlat={north:.5f}&mlon={east:.5f}#map=19/{at}"
+    return [f"Place: {name_text(place)}.", f"Maps: geo:{at} {osm.replace(',', '/')}"]
 
 
 def _motion_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
+from per_obspy.inventory.places import with_towns
 from per_obspy.inventory.schema import Column
 from per_obspy.inventory.suspicions import ODD
 from per_obspy.results.parts import bounded_database, joined_rows, joined_schema, text_columns
@@ -121,7 +122,11 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 
 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
-    """Append rounded rows to a CSV file with a header."""
+    """Append rounded rows to a CSV file with a header; an empty place is the nearest town."""
+    names = rows.column_names
+    if {"place", "longitude", "latitude"} <= set(names):
+        place = with_towns(*(rows[name].to_pandas() for name in ("place", "longitude", "latitude")))
+        rows = rows.set_column(names.index("place"), "place", pa.array(place, pa.string()))
     # Names of columns may differ in case only, or be anything: the database numbers them
     numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
     # It writes a separate file, which is appended to the others
@@ -185,8 +190,9 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    own = DESIGN | {ODD: odd}
-    write_csv(rounded_table(table[csv_columns(table)], own), text)
+    own, short = DESIGN | {ODD: odd}, table[csv_columns(table)]
+    place = with_towns(short["place"], short["longitude"], short["latitude"])
+    write_csv(rounded_table(short.assign(place=place), own), text)
     write_parquet(table, whole)
     write_csv(column_table(map(str, table), own, {}), columns)
     write_rejected(table.attrs["rejected"], rejected)

@@ -61,7 +61,7 @@ def test_coverage_comes_first_and_numbers_have_units(screened):
     lines = out.splitlines()
     assert lines[0].startswith("1 of 2 neighbouring pairs (50 %) have NO VERDICT")
     assert lines[1].startswith("1 of 2 rows of the pair table are screened; left out: 1 (1 out")
-    assert "r0 c33 (0.00" in lines[1]
+    assert "areas most affected: 0.004 N, 0.301 E: 1" in lines[1]
     head = next(line for line in lines if "pair id" in line)
     for unit in ("(s)", "(m)", "(m/s)", "(%)"):
         assert unit in out
