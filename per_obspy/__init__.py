@@ -118,6 +118,8 @@ linearized_correlation
 
 process
     Process the records of a stream so that spectra can be computed from them.
+read_records
+    Read strong-motion records of files and folders, ready for :func:`per_obspy.process`.
 
 **Buildings and pairs**
 
@@ -138,6 +140,17 @@ shear_building
 
 risk_table
     Compute ground motion, demand, state and severity of pairs: one row per pair, worst first.
+screen
+    Screen pairs by records: process, compute spectra, and return the risk table.
+
+**Figures**
+
+plot_pair
+    Plot the largest energy circles of both buildings of a pair, as far apart as the buildings are.
+plot_risk
+    Plot the pairs of a risk table on a map, in the colours of their risk classes.
+plot_spectra
+    Plot the pseudo energy radius against the natural period.
 
 **Whole runs**
 

@@ -7,16 +7,17 @@ from tables import code, table, write_page
 
 from per_obspy.inventory.schema import COLUMNS, Column
 from per_obspy.screening.codes import rule_columns
-from per_obspy.screening.columns import ORDER, known_column
+from per_obspy.screening.columns import ORDER, csv_columns, known_column
 from per_obspy.screening.flags import FLAGS
 
 RISK = """
-# Columns of `risk.csv`
+# Columns of `risk.parquet`
 
 All columns and flags with unit and meaning, made from the table in the code that also writes
 `risk.columns.csv`. [How to read the table](../start/reading.md) explains the important ones with
 examples. A column that the pair table does not have, or that no rule fills, is missing from a
-result. The unit `1` means without dimension; no unit means text.
+result, and `risk.csv` has those with a `yes` only. The unit `1` means without dimension; no unit
+means text.
 """
 
 PAIRS = """
@@ -47,8 +48,11 @@ def write(folder: Path) -> None:
 
 def _meanings(columns: Iterable[Column]) -> str:
     """Return a table of names, units and meanings."""
-    rows = ((code(column.name), column.unit, column.meaning) for column in columns)
-    return table(("column", "unit", "meaning"), rows)
+    rows = [
+        (code(column.name), column.unit, "yes" * bool(csv_columns([column.name])), column.meaning)
+        for column in columns
+    ]
+    return table(("column", "unit", "`risk.csv`", "meaning"), rows)
 
 
 def _schema() -> str:

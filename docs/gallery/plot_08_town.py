@@ -19,7 +19,9 @@ for trace in simulation.stream:
 processed = per_obspy.process(simulation.stream, event=simulation.event)
 
 # %%
-# One Dataset per station, one row per pair, worst first.
+# Spectra of all stations; then one row per pair, worst first. Of records in a folder and a table of
+# pairs in a file, ``per_obspy.screen("records", "pairs.csv")`` returns the same, and
+# ``per_obspy.read_records("records")`` the Stream.
 
 codes = sorted({trace.stats.station for trace in processed})
 stations = [per_obspy.station_spectra(processed.select(station=code)) for code in codes]
@@ -30,16 +32,12 @@ table = per_obspy.risk_table(stations, pairs)
 print(table[["pair_id", "risk_class", "state", "probability", "gap", "demand"]].head())
 
 # %%
-figure, axes = plt.subplots(figsize=(6.0, 4.6), layout="constrained")
-points = axes.scatter(
-    table["longitude"],
-    table["latitude"],
-    c=table["expected_impact_velocity"],
-    cmap="viridis_r",
-    s=25,
-)
-axes.plot(longitudes, latitudes, "k^", markerfacecolor="none", label="stations")
-axes.set(xlabel="longitude (°)", ylabel="latitude (°)", title="200 pairs of buildings")
-figure.colorbar(points, label="expected impact velocity (m/s)")
-axes.legend()
+# Figures are matplotlib axes.
+
+figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
+per_obspy.plot_risk(table, left)
+left.plot(longitudes, latitudes, "k^", markerfacecolor="none")
+# The worst pair that does not touch
+apart = table[table["gap"] > 0].iloc[0]
+per_obspy.plot_pair(apart, right)
 plt.show()

@@ -29,11 +29,6 @@ spectra.to_netcdf(file)
 stored = xr.open_dataset(file)
 print(stored["per_rotd50"].dims, stored["per_rotd50"].attrs)
 
-figure, axes = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
-for station in stored["station"].values:
-    curve = stored["per_rotd50"].sel(station=station, damping=0.05)
-    curve.plot(ax=axes, label=str(station), xscale="log", yscale="log")
-axes.set_title("RotD50 of PER, damping 5 %")
-axes.legend()
+per_obspy.plot_spectra(stored, damping=0.05)
 plt.show()
 stored.close()

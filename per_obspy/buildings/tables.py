@@ -34,7 +34,7 @@ from per_obspy.inventory.schema import Column
 from per_obspy.results.parts import text_columns
 from per_obspy.results.risk import write_worst
 from per_obspy.results.table_files import regrouped, schema_of, table_of, write_meanings
-from per_obspy.results.totals import areas_of
+from per_obspy.results.totals import PLACE, areas_of
 
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000
@@ -192,8 +192,8 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
 def _areas(table: pa.Table, pairs: pa.Table, totals: Totals) -> pa.Array:
     """Return the area of each interface as that of its pair, by the middle of the pair."""
     frame = table.select(["longitude", "latitude"]).to_pandas()
-    if totals.area:
-        frame[AREA] = pairs[AREA].to_pandas()
+    if AREA in pairs.column_names:
+        frame[AREA if totals.area else PLACE] = pairs[AREA].to_pandas()
     return pa.array(areas_of(frame, totals, AREA), pa.string())
 
 

@@ -145,9 +145,30 @@ class Interpolation(Section):
     )
 
 
-class Codes(Section):
-    """Inputs of code rules (``screening/codes.py``); a rule is empty where its input is missing."""
+#: Rules of codes, by the names that a configuration has for them.
+CodeRule = Literal[
+    "asce7-16",
+    "ntc2004",
+    "ntc2004-simplified",
+    "gb50011-2010",
+    "gem",
+    "tbdy2018",
+    "ntc2018-italy",
+    "is1893-2016",
+    "e030-2018",
+    "iran2800",
+    "rpa2024",
+]
 
+
+class Codes(Section):
+    """Code rules (``screening/codes.py``) and their inputs; without its input a cell is empty."""
+
+    rules: tuple[CodeRule, ...] = Field(
+        (),
+        description="code rules to compare gaps with, such as asce7-16 (docs/screening.md lists "
+        "all); each adds a column",
+    )
     ntc_zone: str | None = Field(
         None, pattern="^(I|II|III)$", description="zone of NTC Mexico City 2004: I, II or III"
     )
@@ -166,6 +187,12 @@ class Codes(Section):
             "ft: FEMA P-154"
         ),
     )
+
+    @model_validator(mode="after")
+    def _known_inputs(self) -> Self:
+        if "gb50011-2010" in self.rules and self.gb_intensity is None:
+            raise ValueError("the rule gb50011-2010 needs gb_intensity, 6 to 9")
+        return self
 
 
 class States(Section):
@@ -246,9 +273,7 @@ class Screening(Section):
     interpolation: Interpolation = Field(
         Interpolation(), description="settings of the motion between stations"
     )
-    codes: Codes = Field(
-        Codes(), description="inputs of code rules; a rule without its input stays empty"
-    )
+    codes: Codes = Field(Codes(), description="code rules and their inputs")
 
     @field_validator("classes")
     @classmethod

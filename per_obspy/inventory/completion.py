@@ -22,6 +22,7 @@ from per_obspy.inventory.contact_height import (
     floors_misaligned,
 )
 from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
+from per_obspy.inventory.places import place_names
 from per_obspy.inventory.table_columns import joined_names, numbers_in
 
 #: Periods from heights in m and structural systems, by the name of the formula.
@@ -48,7 +49,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         yield_displacement, hardening``; for the pair ``longitude, latitude, azimuth,
-        contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
+        contact_height, floor_offset, floors_misaligned, gap_std, restitution``, ``place`` and
+        names of buildings by :func:`~per_obspy.inventory.places.place_names`, and ``derived``: the
         names of the derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
@@ -89,6 +91,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     _add_place(table)
     offset = np.nan_to_num(table.columns["floor_offset"])
     return pairs.assign(
+        **place_names(pairs),
         **table.columns,
         **systems,
         derived=joined_names(table.derived),

@@ -194,6 +194,15 @@ def missing_columns(names: Collection[str]) -> list[tuple[str, ...]]:
 COMPLETED: dict[str, Column] = {
     column.name: column
     for column in (
+        Column("place", "str", "",
+               "neighbourhood and street by columns of the pair table; risk.csv fills the nearest "
+               "town where there is none"),
+        *(
+            Column(f"name_{i}", "str", "",
+                   f"building {i}: name, or street and house number, or address, by columns of the "
+                   "pair table")
+            for i in (1, 2)
+        ),
         Column("longitude", "float64", "degrees", "longitude of the middle of the pair, east"),
         Column("latitude", "float64", "degrees", "latitude of the middle of the pair, north"),
         *(

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from obspy import Inventory, Stream
 
 from per_obspy import config
-from per_obspy.errors import Rejection, shortened
+from per_obspy.errors import RecordRejected, Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.processing.account import rejection, taken
 from per_obspy.progress import Progress, silent
@@ -166,6 +166,44 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     rejected = tuple(row for source in opened for row in source.rejected)
     joined = RecordSource(files, inventory, rejected, hashes)
     return _served([joined._replace(reader=reader_of_event(joined.reader, headers))], None, [])
+
+
+def read_records(*paths: str | Path) -> Stream:
+    """
+    Read strong-motion records of files and folders, ready for :func:`per_obspy.process`.
+
+    Every format of ObsPy and of this package is read, and archives of them; StationXML in a folder
+    serves its stations.
+
+    Parameters
+    ----------
+    *paths : str or Path
+        Files and folders, at least one.
+
+    Returns
+    -------
+    obspy Stream
+        Traces with coordinates, orientation, and unit or response.
+
+    Raises
+    ------
+    CatalogError
+        If a path is missing or holds no record.
+    RecordRejected
+        If no record can be read, with every reason. Single records that cannot are logged.
+    """
+    sources = find_path_sources([Path(path) for path in paths])
+    stream, rejected = Stream(), [*sources.rejected]
+    for name, station in sources.stations.items():
+        traces, unread = station.reader(station.files, station.inventory, name)
+        stream += traces
+        rejected += unread
+    reasons = [f"{row.name}: {reason}" for row in rejected for reason in row.reasons]
+    if not stream:
+        raise RecordRejected(", ".join(map(str, paths)), *(reasons or ["no records"]))
+    for reason in reasons:
+        log.warning("left out: %s", reason)
+    return stream
 
 
 def _served(

@@ -6,8 +6,10 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
+from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.columns import DEMAND_RULES, FLAGS
+from per_obspy.screening.ranking import UNKNOWN_STATE
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 if TYPE_CHECKING:
@@ -164,6 +166,8 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
+    if _text(pair, "state") == UNKNOWN_STATE:
+        lines.append("It is ranked by the gap that it needs, as if the buildings touched.")
     # A run has one probability, an ensemble perhaps that of a year too
     if math.isfinite(number(pair, "probability")):
         lines.append(f"Probability of contact: {chance_text(number(pair, 'probability'))}.")
@@ -196,6 +200,12 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
     if math.isfinite(impacts := number(pair, "impacts")):
         fastest = speed_text(number(pair, "impact_velocity_exact"))
         lines.append(f"In this record: {impacts:.0f} impacts, the fastest {fastest}.")
+        if impacts == 0 and expected > 0:
+            lines.append(
+                "The record alone, with the likeliest buildings, closes no gap. Class and rank "
+                "count every outcome of uncertain periods, dampings, gap and motion at the site: "
+                f"{chance_text(number(pair, 'probability'))} of them hit."
+            )
     if math.isfinite(growth := number(pair, "expected_amplification")):
         lines.append(f"Motion with pounding over motion without: {growth:.2f}.")
     return lines
@@ -203,7 +213,7 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _building_lines(pair: Mapping[str, Any]) -> list[str]:
     """Describe both buildings."""
-    lines = list[str]()
+    lines = _place_lines(pair)
     for i in (1, 2):
         facts = {
             "period {:.2f} s": number(pair, f"period_{i}"),
@@ -214,11 +224,23 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
         }
         # Sentences on known values only
         known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
-        name = _text(pair, f"building_id_{i}")
+        names = [_text(pair, f"{column}_{i}") for column in ("name", "building_id")]
+        name = ", ".join(dict.fromkeys(filter(None, names)))
         if known or name:
             title = f"Building {i} ({name_text(name)})" if name else f"Building {i}"
             lines.append(f"{title}: {', '.join(known)}.")
     return lines
+
+
+def _place_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Return where the pair is, with links to maps."""
+    east, north = number(pair, "longitude"), number(pair, "latitude")
+    if not (math.isfinite(east) and math.isfinite(north)):
+        return []
+    (place,) = with_towns([_text(pair, "place")], [east], [north])
+    at = f"{north:.5f},{east:.5f}"
+    osm = f"https://www.openstreetmap.org/?mlat={north:.5f}&mlon={east:.5f}#map=19/{at}"
+    return [f"Place: {name_text(place)}.", f"Maps: geo:{at} {osm.replace(',', '/')}"]
 
 
 def _motion_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -17,7 +17,8 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import temporary_folder, writing, written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
-from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.inventory.places import with_towns
+from per_obspy.inventory.schema import Column
 from per_obspy.inventory.suspicions import ODD
 from per_obspy.results.parts import bounded_database, joined_rows, joined_schema
 from per_obspy.results.ranked_cells import CellFiles, cell_files, cells_of_parts, ranked_writer
@@ -25,14 +26,11 @@ from per_obspy.results.ranked_table import ROWS, RankedTable, ranked_table, tabl
 from per_obspy.results.table_files import (
     rounded_arrow,
     rounded_table,
-    write_columns,
     write_csv,
-    write_described,
     write_parquet,
     write_rejected,
 )
-from per_obspy.screening.codes import rule_columns
-from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.columns import column_table, csv_columns
 from per_obspy.screening.design import DESIGN
 
 
@@ -93,7 +91,7 @@ def write_risk(
             with files as table:
                 for piece in _ranked_rows(parts, schema, whole):
                     table.write_table(piece)
-    write_columns(whole.names, columns)
+    write_csv(column_table(whole.names), columns)
     return RiskFiles([*table_files(folder), text, columns], states, stations)
 
 
@@ -126,16 +124,19 @@ def _write_rows(
 ) -> tuple[Counter[str], Counter[str]]:
     """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
     states, stations, before = Counter[str](), Counter[str](), 0
+    short: list[str] = []
     with bounded_database(text.parent) as database:
         for piece in rows:
             table.write_table(piece)
             count_values(piece["state"], states)
             count_values(piece["station"], stations)
             if not before:
-                text.write_text(header(piece.column_names), encoding="utf-8")
+                short = csv_columns(piece.column_names)
+                text.write_text(header(short), encoding="utf-8")
             # Rows whose rank is at most the number of rows of the text
             if before < csv_rows:
-                _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
+                worst = piece.select(short).slice(0, csv_rows - before)
+                _append_csv(database, rounded_arrow(worst), text)
             before += piece.num_rows
     return states, stations
 
@@ -156,7 +157,11 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 
 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
-    """Append rounded rows to a CSV file with a header."""
+    """Append rounded rows to a CSV file with a header; an empty place is the nearest town."""
+    names = rows.column_names
+    if {"place", "longitude", "latitude"} <= set(names):
+        place = with_towns(*(rows[name].to_pandas() for name in ("place", "longitude", "latitude")))
+        rows = rows.set_column(names.index("place"), "place", pa.array(place, pa.string()))
     # Names of columns may differ in case only, or be anything: the database numbers them
     numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
     # It writes a separate file, which is appended to the others
@@ -175,10 +180,13 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
 def write_worst(table: Path, rows: int, path: Path) -> None:
     """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
     with ranked_table([table]) as ranked:
-        write_worst_rows(ranked, rows, path, ranked.schema.names)
+        names = ranked.schema.names
+        write_worst_rows(ranked, rows, path, names, names)
 
 
-def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[str] = ()) -> None:
+def write_worst_rows(
+    table: RankedTable, rows: int, path: Path, columns: Sequence[str], own: Collection[str] = ()
+) -> None:
     """
     Write the worst rows of a ranked table as CSV.
 
@@ -190,12 +198,14 @@ def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[
         Largest number of rows.
     path : Path
         The file.
+    columns : sequence of str
+        Its columns.
     own : collection of str
         Columns of numbers that are rounded besides those that the package defines.
     """
     with bounded_database(path.parent) as database, written_whole(path) as part:
-        part.write_text(header(table.schema.names), encoding="utf-8")
-        for piece in table.ranked(rows):
+        part.write_text(header(columns), encoding="utf-8")
+        for piece in table.ranked(rows, columns):
             _append_csv(database, rounded_arrow(piece, own), part)
 
 
@@ -215,12 +225,10 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns() | {ODD: odd}
-    write_csv(rounded_table(table, own=known), text)
+    own, short = DESIGN | {ODD: odd}, table[csv_columns(table)]
+    place = with_towns(short["place"], short["longitude"], short["latitude"])
+    write_csv(rounded_table(short.assign(place=place), own), text)
     write_parquet(table, whole)
-    # Columns of the pair table that are not computed here are carried through
-    carried = Column("", "", "", "carried through from the pair table")
-    described = (known.get(name, carried)._replace(name=name) for name in map(str, table))
-    write_described(described, columns)
+    write_csv(column_table(map(str, table), own, {}), columns)
     write_rejected(table.attrs["rejected"], rejected)
     return paths

@@ -1,9 +1,9 @@
 """
 Files of tables: CSV with rounded numbers and Parquet with described columns, written whole.
 
-CSV files and workbooks have numbers of five significant digits, and coordinates of seven decimals
-(a centimetre). Parquet files keep all digits. Columns that the pair table brings along stay as
-they are: they may be identifiers.
+CSV files and workbooks have numbers of five significant digits, of two where the contact law
+decides, and coordinates of seven decimals (a centimetre). Parquet files keep all digits. Columns
+that the pair table brings along stay as they are: they may be identifiers.
 """
 
 import csv
@@ -23,7 +23,7 @@ from per_obspy.errors import Rejection, shortened
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import cell, cells
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.columns import column_table, known_column
+from per_obspy.screening.columns import BY_CONTACT, known_column
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
@@ -66,11 +66,6 @@ def write_parquet(table: pd.DataFrame, path: Path) -> None:
         _plain(table).to_parquet(part, index=False)
 
 
-def write_columns(names: Iterable[str], path: Path) -> None:
-    """Write unit and meaning of each of these columns, and of every flag."""
-    write_csv(column_table(names), path)
-
-
 def write_described(columns: Iterable[Column], path: Path) -> None:
     """Write name, unit and meaning of these columns."""
     rows = [(column.name, column.unit, column.meaning) for column in columns]
@@ -106,8 +101,8 @@ def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:
     return kinds
 
 
-#: Significant digits of numbers, and decimals of coordinates in degrees.
-DIGITS, DECIMALS = 5, 7
+#: Significant digits of numbers, of those by the contact law, and decimals of degrees.
+DIGITS, CONTACT_DIGITS, DECIMALS = 5, 2, 7
 
 #: Powers of ten that are exact as numbers: 10^22 is the largest.
 _EXACT = 22
@@ -201,7 +196,7 @@ def _rounded_column(name: str, numbers: FloatArray) -> NDArray[np.float64]:
     """Round the numbers of a column: coordinates to decimals, others to significant digits."""
     if name.startswith(("longitude", "latitude")):
         return np.asarray(np.round(numbers, DECIMALS))
-    return rounded(numbers)
+    return rounded(numbers, CONTACT_DIGITS if name in BY_CONTACT else DIGITS)
 
 
 def schema_of(columns: Iterable[Column], facts: Mapping[str, str] | None = None) -> pa.Schema:

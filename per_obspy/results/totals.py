@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
+from per_obspy.inventory.places import near_towns
 from per_obspy.results.table_files import rounded_table, write_csv
 from per_obspy.screening.totals import (
+    GridCells,
     PartialTotals,
     box_outlines,
     grid_cells,
@@ -40,6 +42,10 @@ COLUMNS = (
 )
 
 
+#: Column that names the area of a pair where the settings name none.
+PLACE = "place"
+
+
 class RegionTotals(NamedTuple):
     """
     Totals of a region.
@@ -50,7 +56,7 @@ class RegionTotals(NamedTuple):
         One row per area: see :func:`per_obspy.screening.totals.totals`.
     outlines : list of ndarray or None
         Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
-        for named areas, whose outline is unknown.
+        if an area has a name, whose outline is unknown.
     """
 
     table: pd.DataFrame
@@ -100,7 +106,7 @@ def _joined(pieces: Sequence[PieceTotals]) -> PieceTotals:
 
 def totals_columns(settings: Totals) -> list[str]:
     """Return the columns of the risk table that totals of these areas need."""
-    return [*COLUMNS, *([settings.area] if settings.area else [])]
+    return [*COLUMNS, settings.area or PLACE]
 
 
 def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) -> PieceTotals:
@@ -110,7 +116,7 @@ def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) 
     Parameters
     ----------
     piece : DataFrame
-        With the columns of :func:`totals_columns`.
+        With the columns of :func:`totals_columns` that the table has.
     settings : Totals
         Column of the pair table that names the area, or else the kind of cells.
     classes : sequence of str
@@ -119,10 +125,29 @@ def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) 
     if settings.area or settings.h3 is not None:
         area = areas_of(piece, settings, settings.area or "")
         return PieceTotals(partial_totals(piece, area, classes))
-    # Cells of a grid, whose outlines are known
-    cells = grid_cells(piece["longitude"], piece["latitude"], settings.cell)
+    # Cells of a grid, whose outlines are known, where the place of a pair has no name
+    cells = named_cells(piece["longitude"], piece["latitude"], settings.cell)
     boxes = dict(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
-    return PieceTotals(partial_totals(piece, cells.cell, classes), boxes)
+    return PieceTotals(partial_totals(piece, _with_cells(piece, cells), classes), boxes)
+
+
+def named_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCells:
+    """Return the cells of places as :func:`grid_cells` does, named by the nearest town."""
+    cells = grid_cells(longitude, latitude, size)
+    boxes = cells.boxes
+    # Longitudes of a cell may go on beyond 180 degrees
+    east = (boxes[["west", "east"]].mean(axis=1) + 180.0) % 360.0 - 180.0
+    north = boxes[["south", "north"]].mean(axis=1).clip(-90.0, 90.0)
+    names = near_towns(east, north, size)
+    return GridCells(names[boxes.index.get_indexer(cells.cell)], boxes.set_axis(names))
+
+
+def _with_cells(piece: pd.DataFrame, cells: GridCells) -> NDArray[np.object_]:
+    """Return the place of each row, or else the name of its cell."""
+    if PLACE not in piece:
+        return cells.cell
+    place = piece[PLACE].fillna("").astype(str)
+    return np.asarray(place.where(place != "", cells.cell), dtype=object)
 
 
 def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.object_]:
@@ -132,7 +157,8 @@ def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.o
     Parameters
     ----------
     piece : DataFrame
-        With ``longitude, latitude``, degrees, and the column of areas if these have names.
+        With ``longitude, latitude``, degrees, the column of areas if the settings name it, and
+        ``place`` if it is known.
     settings : Totals
         Kind of areas.
     column : str
@@ -143,7 +169,7 @@ def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.o
     longitude, latitude = piece["longitude"], piece["latitude"]
     if settings.h3 is not None:
         return np.asarray(hexagons(longitude, latitude, settings.h3), dtype=object)
-    return grid_cells(longitude, latitude, settings.cell).cell
+    return _with_cells(piece, named_cells(longitude, latitude, settings.cell))
 
 
 def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
@@ -202,7 +228,10 @@ def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTota
         return RegionTotals(table, None)
     if settings.h3 is not None:
         return RegionTotals(table, hexagon_outlines(table["area"]))
-    return RegionTotals(table, [counted.boxes[name] for name in table["area"]])
+    # One area with a name of its own leaves no outline to all
+    is_grid = counted.boxes.keys() >= set(table["area"])
+    outlines = [counted.boxes[name] for name in table["area"]] if is_grid else None
+    return RegionTotals(table, outlines)
 
 
 def write_totals(table: pd.DataFrame, path: Path) -> None:

@@ -13,6 +13,7 @@ from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.ranked_table import ranked_table, table_files
+from per_obspy.results.totals import PLACE
 from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.tasks.building_rows import RowsTask
 from per_obspy.runs.tasks.ground_files import GroundFiles
@@ -70,7 +71,7 @@ def building_rows(
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
-        found = find_rows(pairs, settings.rows, settings.totals.area, room)
+        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
         tasks = _tasks(settings, folder, ground, found)
         parts = _parts(tasks, context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one

@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from per_obspy.checks import FloatArray
 from per_obspy.config import Pairs, Run, Totals
 from per_obspy.errors import Rejection
 from per_obspy.inventory.cells import plain_numbers
 from per_obspy.inventory.files.headings import IDENTIFIER
 from per_obspy.inventory.files.raw_rows import RawRows
+from per_obspy.inventory.places import place_columns, place_names
 from per_obspy.results.coverage import Search, search_of_table
-from per_obspy.results.totals import areas_of
-from per_obspy.screening.totals import grid_cells
+from per_obspy.results.totals import PLACE, areas_of
 
 #: Coordinates of both buildings of a pair, without their number.
 _PLACE = ("longitude", "latitude")
@@ -107,7 +106,7 @@ def areas_left_out(totals: Totals, rejected: Sequence[Rejection], rows: RawRows)
         lost |= [str(name).strip() in names for name in rows.table[IDENTIFIER].to_pylist()]
     # Cells as they were read, as numbers or as text
     columns = [f"{name}_{i}" for name in _PLACE for i in (1, 2)]
-    columns += [totals.area] if totals.area else []
+    columns += [totals.area] if totals.area else place_columns(rows.table.column_names)
     chosen = [name for name in dict.fromkeys(columns) if name in rows.table.column_names]
     table = rows.table.select(chosen).filter(lost).to_pandas()
     if totals.area is None:
@@ -116,7 +115,7 @@ def areas_left_out(totals: Totals, rejected: Sequence[Rejection], rows: RawRows)
 
 
 def _cells_of(totals: Totals, table: pd.DataFrame) -> Sequence[str]:
-    """Return the hexagon or grid cell of each row whose coordinates can be read."""
+    """Return the place, hexagon or grid cell of each row whose coordinates can be read."""
     # The middle of both buildings, across the date line too, or the one that has coordinates
     east, far_east, north, far_north = (
         plain_numbers(table[f"{name}_{i}"]) for name in _PLACE for i in (1, 2)
@@ -127,25 +126,11 @@ def _cells_of(totals: Totals, table: pd.DataFrame) -> Sequence[str]:
     latitude = (north + far_north.fillna(north)) / 2.0
     # A coordinate in metres or exchanged is in no cell
     usable = east.abs().le(180.0) & latitude.abs().le(90.0)
-    places = pd.DataFrame({"longitude": longitude, "latitude": latitude})[usable]
+    named = {PLACE: place_names(table)[PLACE]}
+    places = pd.DataFrame({"longitude": longitude, "latitude": latitude, **named})[usable]
     if places.empty:
         return []
-    if totals.h3 is not None:
-        return list(areas_of(places, totals, ""))
-    return cell_names(places["longitude"].to_numpy(), places["latitude"].to_numpy(), totals.cell)
-
-
-def cell_names(longitude: FloatArray, latitude: FloatArray, size: float) -> list[str]:
-    """Return the grid cell (m) of each place (degrees), with latitude and longitude amid it."""
-    cells = grid_cells(longitude, latitude, size)
-    # Each cell is named once
-    boxes = cells.boxes
-    north, east = boxes[["south", "north"]].mean(axis=1), boxes[["west", "east"]].mean(axis=1)
-    names = {
-        name: f"{name} ({north[name]:.3f}, {(east[name] + 180.0) % 360.0 - 180.0:.3f})"
-        for name in boxes.index
-    }
-    return [names[name] for name in cells.cell]
+    return list(areas_of(places, totals, ""))
 
 
 def search_of_tables(tables: Mapping[Path, int]) -> Search | None:

@@ -47,23 +47,58 @@ GB_FACTOR = {
 IRAN_STOREYS = 8.0
 
 
+#: Column that compares the gap with all rules that were asked for.
+SUFFICES = Column(
+    "gap_suffices",
+    "str",
+    "",
+    "no if the gap is below a required_gap_... of the row, yes if it reaches all of them, unknown "
+    "if one is empty",
+)
+
+
 def code_rules() -> pd.DataFrame:
-    """Read the rules: column, unit, clause, edition, inputs, source, meaning."""
+    """Read the rules: rule, column, unit, clause, edition, inputs, source, meaning."""
     with files("per_obspy.screening").joinpath("code_rules.csv").open(encoding="utf-8") as table:
         return pd.read_csv(table, keep_default_na=False)
 
 
 @cache
 def rule_columns() -> dict[str, Column]:
-    """Return the columns of the rules; each meaning begins with edition and clause."""
+    """Return all columns of rules; each meaning begins with edition and clause."""
     columns = {}
     for rule in code_rules().astype(str).to_dict("records"):
         meaning = f"{rule['edition']}, {rule['clause']}: {rule['meaning']}"
         columns[rule["column"]] = Column(rule["column"], "float64", rule["unit"], meaning)
-    return columns
+    return columns | {SUFFICES.name: SUFFICES}
+
+
+@cache
+def _rules() -> dict[str, str]:
+    """Return column -> rule as a configuration names it."""
+    rules = code_rules()
+    return dict(zip(rules["column"], rules["rule"], strict=True))
 
 
 def code_columns(
+    pairs: pd.DataFrame, displacement_1: ArrayLike, displacement_2: ArrayLike, codes: Codes
+) -> pd.DataFrame:
+    """
+    Compute the required gap of each rule in ``codes.rules``, and whether the gap suffices.
+
+    Arguments are those of :func:`required_gaps`. There is no column if there is no rule.
+    """
+    asked = [name for name, rule in _rules().items() if rule in codes.rules]
+    if not asked:
+        return pd.DataFrame(index=pairs.index)
+    required = required_gaps(pairs, displacement_1, displacement_2, codes)[asked]
+    too_small = required.gt(values(pairs, "gap"), axis=0).any(axis=1)
+    unknown = required.isna().any(axis=1)
+    answer = np.select([too_small, unknown], ["no", "unknown"], "yes").astype(object)
+    return required.assign(**{SUFFICES.name: answer})
+
+
+def required_gaps(
     pairs: pd.DataFrame, displacement_1: ArrayLike, displacement_2: ArrayLike, codes: Codes
 ) -> pd.DataFrame:
     """
@@ -95,7 +130,7 @@ def code_columns(
         checks.not_negative("displacement_2", displacement_2),
     )
     gaps = _height_gaps(pairs, codes) | _displacement_gaps(pairs, sides, codes)
-    return pd.DataFrame(gaps, index=pairs.index).add_prefix("required_gap_")[[*rule_columns()]]
+    return pd.DataFrame(gaps, index=pairs.index).add_prefix("required_gap_")[[*_rules()]]
 
 
 def _height_gaps(pairs: pd.DataFrame, codes: Codes) -> Columns:

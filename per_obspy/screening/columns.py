@@ -1,7 +1,8 @@
 """Columns of the risk table in their order, with units and meanings; flags and their meanings."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
+from types import MappingProxyType
 
 import pandas as pd
 
@@ -39,8 +40,8 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "rank",
             "",
-            "order of severity, 1 is the worst: by expected impact velocity, then "
-            "amplification, probability, importance",
+            "order of severity, 1 is the worst: by expected impact velocity, then amplification, "
+            "probability, importance; a pair of unknown gap as if its buildings touched",
         ),
         _text(
             "risk_class",
@@ -263,6 +264,32 @@ ORDER = (
     "derived",
 )  # fmt: skip
 
+#: Columns of ``risk.csv`` and ``design.csv``, as far as the table has them; the rules of codes that
+#: were asked for follow.
+CSV_COLUMNS = (
+    "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
+    "gap", "demand", "demand_rule", "missing_gap", "supplemental_damping", "bumper_restitution",
+    "flags", "place", "name_1", "name_2", "building_id_1", "building_id_2", "longitude",
+    "latitude", "station", "distance",
+    "storeys_1", "storeys_2", "system_1", "system_2", "floors_misaligned",
+)  # fmt: skip
+
+#: Columns that depend on the contact law, whose own deviation is 5 to 20 %: texts have two digits.
+BY_CONTACT = frozenset(
+    {
+        *("expected_impact_velocity", "impact_velocity_84", "expected_amplification"),
+        *("impact_velocity", "impact_velocity_exact", "worst_expected_impact_velocity"),
+        *(f"amplification{exact}_{i}" for exact in ("", "_exact") for i in (1, 2)),
+    }
+)
+
+
+def csv_columns(names: Iterable[str]) -> list[str]:
+    """Return the columns of a table that its CSV file has, in their order."""
+    known = list(names)
+    return [name for name in (*CSV_COLUMNS, *rule_columns()) if name in known]
+
+
 #: Flags that the processing raises for a record, which every pair of its station has.
 RECORD_FLAGS = (
     "baseline_shift",
@@ -409,7 +436,11 @@ def known_column(name: str) -> Column | None:
     return _known().get(name)
 
 
-def column_table(names: Iterable[str]) -> pd.DataFrame:
+def column_table(
+    names: Iterable[str],
+    own: Mapping[str, Column] = MappingProxyType({}),
+    flags: Mapping[str, str] = MappingProxyType(FLAGS),
+) -> pd.DataFrame:
     """
     Return unit and meaning of columns, then of every flag, as written to ``risk.columns.csv``.
 
@@ -417,17 +448,26 @@ def column_table(names: Iterable[str]) -> pd.DataFrame:
     ----------
     names : iterable of str
         Columns of a risk table.
+    own : mapping of str to Column
+        Columns with another meaning than in a risk table, or none there.
+    flags : mapping of str to str
+        Flags and their meanings.
 
     Returns
     -------
     DataFrame
-        Columns ``name, unit, meaning``; one row per column and one ``flag_<name>`` per flag.
+        Columns ``name, unit, in_csv, meaning``; one row per column and one ``flag_<name>`` per
+        flag. ``in_csv`` is ``yes`` for the columns of the CSV file, the Parquet file has all.
     """
-    rows = []
+    names = list(names)
+    short = set(csv_columns(names))
     # Columns that the user added to the pair table are not in the schema
-    carried = _text("", "carried through from the pair table")
-    for name in names:
-        column = known_column(name) or carried
-        rows.append((name, column.unit, column.meaning))
-    rows += [(f"flag_{name}", "", meaning) for name, meaning in FLAGS.items()]
-    return pd.DataFrame(rows, columns=["name", "unit", "meaning"])
+    known, carried = _known() | own, _text("", "carried through from the pair table")
+    columns = [known.get(name, carried) for name in names]
+    table = {
+        "name": [*names, *(f"flag_{name}" for name in flags)],
+        "unit": [*(column.unit for column in columns), *([""] * len(flags))],
+        "in_csv": [*("yes" if name in short else "no" for name in names), *([""] * len(flags))],
+        "meaning": [*(column.meaning for column in columns), *flags.values()],
+    }
+    return pd.DataFrame(table)

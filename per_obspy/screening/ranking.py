@@ -16,10 +16,14 @@ KEYS = (
     "order_velocity",
     "order_amplification",
     "order_probability",
-    "order_demand",
     "order_importance",
     "order_occupants",
 )
+
+#: Expected impact velocity of a pair over its demand times the mean of both angular frequencies:
+#: median of 2345 touching pairs of real and simulated records, 0.51 (log-standard deviation 0.42);
+#: 0.59 where the gap is half of the demand.
+VELOCITY_OF_DEMAND = 0.5
 
 
 def pounding_state(probability: FloatArray, states: States) -> TextArray:
@@ -104,8 +108,8 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
 
     The order is by expected impact velocity, then by expected amplification; ties are broken by
     probability, importance, occupants and at last the name, so that it does not depend on the order
-    in which pairs were computed. Pairs without a probability, because their gap is unknown, follow
-    all others, the largest demand first.
+    in which pairs were computed. Pairs without a probability, because their gap is unknown, stand
+    beside the others as if their buildings touched: by ``VELOCITY_OF_DEMAND``.
     """
     keys = _order_keys(table)
     # lexsort sorts by its last row first
@@ -125,10 +129,9 @@ def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
     """Return the columns ``KEYS``; the worst pair has the smallest numbers."""
     # Negated, for more is worse
     keys = (
-        -_largest(table, "expected_impact_velocity"),
+        -np.maximum(_largest(table, "expected_impact_velocity"), _velocity_of_unknown(table)),
         -_largest(table, "expected_amplification"),
         -_largest(table, "probability"),
-        _demand_of_unknown(table),
         -_largest(table, "importance_1", "importance_2"),
         -_largest(table, "occupants_1", "occupants_2"),
     )
@@ -149,10 +152,13 @@ def _ties_by_name(order: IndexArray, badness: FloatArray, names: TextArray) -> I
     return result
 
 
-def _demand_of_unknown(table: pd.DataFrame) -> FloatArray:
-    """Return the negative demand of pairs without a probability, 0 for other pairs."""
-    unknown = table.reindex(columns=["probability"]).isna().to_numpy(bool)[:, 0]
-    return np.where(unknown, -_largest(table, "demand"), 0.0)
+def _velocity_of_unknown(table: pd.DataFrame) -> FloatArray:
+    """Return the impact velocity that the demand stands for where the gap is unknown, else 0."""
+    known = table.reindex(columns=["probability", "demand", "period_1", "period_2"])
+    probability, demand, *periods = known.to_numpy(np.float64).T
+    frequency = np.pi * sum(1.0 / period for period in periods)
+    velocity = np.where(np.isnan(probability), VELOCITY_OF_DEMAND * frequency * demand, 0.0)
+    return np.nan_to_num(velocity)
 
 
 def _largest(table: pd.DataFrame, *names: str) -> FloatArray:

@@ -95,7 +95,7 @@ TOTALS: dict[str, Column] = {
             "area",
             "str",
             "",
-            "name of the area or of the cell; empty where the pair table has none",
+            "place of the pairs, else the nearest town and the way from it to the middle of a cell",
         ),
         Column("pairs", "int64", "1", "pairs in the area"),
         *(Column(state, "int64", "1", f"pairs of the state {state}") for state in EVERY_STATE),

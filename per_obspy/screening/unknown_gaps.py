@@ -9,6 +9,7 @@ depend on the gap are emptied at the end. A pair whose gap is assumed by the con
 import numpy as np
 import pandas as pd
 
+from per_obspy.screening.codes import SUFFICES
 from per_obspy.screening.ranking import UNKNOWN_STATE
 from per_obspy.screening.values import values
 
@@ -65,8 +66,10 @@ def without_gap(table: pd.DataFrame) -> pd.DataFrame:
     unknown = table["unknown_gap"].to_numpy(bool)
     emptied = unknown & ~table["assumed_gap"].to_numpy(bool)
     table = table.drop(columns=list(MARKS))
-    # The class names the reason, whatever was assumed
+    # The class names the reason, whatever was assumed; an assumed gap complies with no rule
     table = table.assign(risk_class=table["risk_class"].mask(unknown, UNKNOWN_CLASS))
+    if SUFFICES.name in table:
+        table = table.assign(**{SUFFICES.name: table[SUFFICES.name].mask(unknown, "unknown")})
     if not emptied.any():
         return table
     numbers = {name: table[name].mask(emptied, np.nan) for name in NUMBERS if name in table}

@@ -24,7 +24,7 @@ def screened(call, tmp_path):
     (tmp_path / "pairs.csv").write_text(PAIRS)
     (tmp_path / "design.toml").write_text(
         'spectrum = "code.csv"\npairs = "pairs.csv"\noutput = '
-        '"out"\n[screening.codes]\ngb_intensity = 8\n'
+        '"out"\n[screening.codes]\ngb_intensity = 8\nrules = ["gem", "gb50011-2010"]\n'
     )
 
     return lambda *arguments: call("screen", tmp_path / "design.toml", *arguments)
@@ -35,16 +35,20 @@ def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     assert code == 0
     assert "1 pairs (1 yes, 0 likely, 0 possible, 0 unlikely, 0 no), 1 rejected" in out
     table = pd.read_csv(tmp_path / "out" / "design.csv")
-    columns = pd.read_csv(tmp_path / "out" / "design.columns.csv").set_index("name")["meaning"]
-    assert columns.index.tolist() == list(table)
+    described = pd.read_csv(tmp_path / "out" / "design.columns.csv").set_index("name")
+    whole, columns = pd.read_parquet(tmp_path / "out" / "design.parquet"), described["meaning"]
+    assert columns.index.tolist() == list(whole)
+    # The text has the columns that a reader needs, in its own order
+    assert len(table.columns) <= 30
+    assert set(table) == set(described.index[described["in_csv"] == "yes"])
+    assert table["gap_suffices"].tolist() == ["no"]
+    assert table["required_gap_gem"].tolist() == [0.48]  # 0.04 of 12 m
     carried = columns[columns.str.startswith("carried")].index.tolist()
     assert carried == ["owner"]
     assert "GB 50011-2010" in columns["required_gap_gb50011_2010"]
     rejected = pd.read_csv(tmp_path / "out" / "rejected.csv")
     assert rejected["reasons"].tolist() == ["period_2 = 9 s is outside the spectrum's 0.1 to 4 s"]
-    pd.testing.assert_frame_equal(
-        pd.read_parquet(tmp_path / "out" / "design.parquet")[["gap"]], table[["gap"]]
-    )
+    pd.testing.assert_frame_equal(whole[["gap"]], table[["gap"]])
 
 
 def test_a_folder_stands_for_its_only_configuration(screened, tmp_path, call):
@@ -57,7 +61,7 @@ def test_coverage_comes_first_and_numbers_have_units(screened):
     lines = out.splitlines()
     assert lines[0].startswith("1 of 2 neighbouring pairs (50 %) have NO VERDICT")
     assert lines[1].startswith("1 of 2 rows of the pair table are screened; left out: 1 (1 out")
-    assert "r0 c33 (0.00" in lines[1]
+    assert "areas most affected: 0.004 N, 0.301 E: 1" in lines[1]
     head = next(line for line in lines if "pair id" in line)
     for unit in ("(s)", "(m)", "(m/s)", "(%)"):
         assert unit in out

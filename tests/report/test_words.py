@@ -63,6 +63,22 @@ def test_an_unknown_gap_is_no_promise():
     assert not any(line.startswith("Probability") for line in lines)
 
 
+def test_a_rank_is_explained_where_the_record_shows_no_impact():
+    # would catch "rank 1, severe" beside "0 impacts" without a reason
+    lines = pair_lines(PAIR | {"impacts": 0, "impact_velocity_exact": 0.0, "rank": 1})
+    assert "In this record: 0 impacts, the fastest 0 cm/s." in lines
+    reason = lines[lines.index("In this record: 0 impacts, the fastest 0 cm/s.") + 1]
+    assert "count every outcome" in reason
+    assert "52 of 100" in reason
+    # Nothing to explain where no outcome hits, or where the gap is unknown
+    quiet = {"impacts": 0, "expected_impact_velocity": 0.0, "probability": 0.0, "state": "no"}
+    assert not any("outcome" in line for line in pair_lines(PAIR | quiet))
+    unknown = {"state": "unknown", "gap": np.nan, "probability": np.nan, "impacts": np.nan}
+    assert "It is ranked by the gap that it needs, as if the buildings touched." in pair_lines(
+        PAIR | unknown | {"expected_impact_velocity": np.nan}
+    )
+
+
 BARE = {"pair_id": "P7", "rank": 1, "gap": 0.3, "demand": 0.1, "state": "no"}
 
 

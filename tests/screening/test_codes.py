@@ -2,15 +2,19 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from pydantic import ValidationError
 
 from per_obspy.config import Building, Codes
+from per_obspy.config.screening import CodeRule
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.codes import NTC_SIMPLIFIED, code_columns, code_rules
+from per_obspy.screening.codes import NTC_SIMPLIFIED, code_columns, code_rules, required_gaps
+from per_obspy.screening.unknown_gaps import kept_apart, without_gap
 
 REGION = Codes(ntc_zone="III", gb_intensity=8)
 
@@ -29,7 +33,7 @@ def _pairs(**columns):
 
 def _rule(name, pairs, displacement_1=0.03, displacement_2=0.04, codes=REGION):
     count = len(pairs)
-    return code_columns(
+    return required_gaps(
         pairs, np.full(count, displacement_1), np.full(count, displacement_2), codes
     )[name].tolist()
 
@@ -37,11 +41,47 @@ def _rule(name, pairs, displacement_1=0.03, displacement_2=0.04, codes=REGION):
 def test_every_column_is_in_the_table_of_rules_with_its_source():
     # would catch a rule without a source, and a stale row of the table
     rules = code_rules().set_index("column")
-    columns = code_columns(_pairs(), [0.03], [0.04], REGION).columns
+    columns = required_gaps(_pairs(), [0.03], [0.04], REGION).columns
     assert columns.tolist() == rules.index.tolist()
     for name, rule in rules.iterrows():
         assert ("event_based" in name) == ("SD" in rule["inputs"])
         assert all(rule[["clause", "edition", "inputs", "source", "meaning"]])
+
+
+def test_a_configuration_names_every_rule_and_no_other():
+    names = code_rules()["rule"].tolist()
+    assert set(get_args(CodeRule)) == set(names)
+    assert Codes(rules=names, gb_intensity=7).rules == tuple(names)
+    for rules in (["asce7"], ["required_gap_gem"], [""]):
+        with pytest.raises(ValidationError, match="rules"):
+            Codes(rules=rules)
+    # Without its intensity the Chinese rule would be an empty column
+    with pytest.raises(ValidationError, match=r"needs gb_intensity, 6 to 9"):
+        Codes(rules=["gb50011-2010"])
+
+
+def test_only_rules_that_are_asked_for_have_a_column():
+    pairs, moved = _pairs(gap=[0.05, 0.04]), np.full((2, 2), 0.025)
+    assert code_columns(pairs, *moved, Codes()).shape == (2, 0)
+    # The sum of both is 0.05 m, which the first gap just reaches
+    one = code_columns(pairs, *moved, Codes(rules=["asce7-16"]))
+    assert one.columns.tolist() == ["required_gap_asce7_event_based", "gap_suffices"]
+    assert one["gap_suffices"].tolist() == ["yes", "no"]
+    # A rule that is not met decides, and a rule without its zone is not guessed
+    two = code_columns(pairs, *moved, Codes(rules=["asce7-16", "gem"]))
+    assert two["gap_suffices"].tolist() == ["no", "no"]
+    zone = code_columns(pairs, *moved, Codes(rules=["asce7-16", "ntc2004"]))
+    assert zone["gap_suffices"].tolist() == ["unknown", "no"]
+
+
+@pytest.mark.parametrize("assumed", [None, 0.5])
+def test_an_unknown_gap_suffices_for_no_rule(assumed):
+    # would catch the gap of 1000 m that stands for an unknown one, and one that is assumed
+    silent = _pairs().drop(columns=["derived", "gap_std"]).assign(gap=np.nan)
+    apart = kept_apart(completed_pairs(silent, Building(gap=assumed)))
+    table = apart.join(code_columns(apart, [0.03], [0.04], Codes(rules=["asce7-16"])))
+    table = without_gap(table.assign(risk_class="low", state="no"))
+    assert table["gap_suffices"].tolist() == ["unknown"]
 
 
 def test_the_page_of_the_documentation_names_every_rule():
@@ -230,7 +270,7 @@ def test_gaps_never_shrink_with_displacement_or_height():
     gaps = {}
     for factor in (0.0, 1.0, 3.0):
         displacement = np.full(len(heights), 0.05 * factor)
-        table = code_columns(_pairs(**size), displacement, displacement, codes)
+        table = required_gaps(_pairs(**size), displacement, displacement, codes)
         gaps[factor] = table.filter(regex="^required_gap_").astype(float)
         assert (gaps[factor].diff().dropna() >= 0).all(axis=None)
     assert (gaps[1.0] >= gaps[0.0]).all(axis=None)
@@ -244,7 +284,7 @@ def test_a_rule_without_its_inputs_stays_empty_instead_of_guessing():
     # would catch unknown floors taken as aligned, and a region assumed
     silent = dict.fromkeys(("height_1", "height_2", "storeys_1", "storeys_2"), np.nan)
     pairs = _pairs(**silent, period_1=0.5, period_2=0.8, system_1="", system_2="")
-    row = code_columns(pairs, [0.03], [0.04], Codes()).iloc[0]
+    row = required_gaps(pairs, [0.03], [0.04], Codes()).iloc[0]
     known = row.dropna()
     # unknown floors are not aligned, an unknown property is not one
     expected = {
@@ -259,14 +299,14 @@ def test_a_rule_without_its_inputs_stays_empty_instead_of_guessing():
 def test_event_based_rules_keep_the_order_and_scale_of_the_buildings():
     # would catch a building taken twice, and a displacement in other units
     pairs = _pairs(system_2="other", gap=[0.0, 0.1, 0.2])
-    once = code_columns(pairs, [0.1, 0.2, 0.3], [0.3, 0.1, 0.2], REGION)
-    swapped = code_columns(pairs, [0.3, 0.1, 0.2], [0.1, 0.2, 0.3], REGION)
+    once = required_gaps(pairs, [0.1, 0.2, 0.3], [0.3, 0.1, 0.2], REGION)
+    swapped = required_gaps(pairs, [0.3, 0.1, 0.2], [0.1, 0.2, 0.3], REGION)
     pd.testing.assert_frame_equal(once, swapped)
-    double = code_columns(pairs, [0.2, 0.4, 0.6], [0.6, 0.2, 0.4], REGION)
+    double = required_gaps(pairs, [0.2, 0.4, 0.6], [0.6, 0.2, 0.4], REGION)
     for name in ("asce7_event_based", "is1893_amended_event_based"):
         assert_allclose(double[f"required_gap_{name}"], 2 * once[f"required_gap_{name}"])
 
 
 def test_a_displacement_that_is_none_is_refused():
     with pytest.raises(ValueError, match=r"displacement_2 must be zero or more, got -0.1"):
-        code_columns(_pairs(), [0.1], [-0.1], REGION)
+        required_gaps(_pairs(), [0.1], [-0.1], REGION)

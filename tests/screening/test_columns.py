@@ -2,7 +2,16 @@
 
 from per_obspy.inventory.schema import COLUMNS, COMPLETED
 from per_obspy.screening.codes import rule_columns
-from per_obspy.screening.columns import FLAGS, ORDER, RESULTS, column_table, known_column
+from per_obspy.screening.columns import (
+    BY_CONTACT,
+    CSV_COLUMNS,
+    FLAGS,
+    ORDER,
+    RESULTS,
+    column_table,
+    csv_columns,
+    known_column,
+)
 
 
 def test_every_leading_column_is_known_and_occurs_once():
@@ -36,12 +45,23 @@ def test_results_do_not_hide_columns_of_the_pair_table():
     assert set(RESULTS).isdisjoint(rule_columns())
 
 
+def test_the_text_has_at_most_thirty_columns_of_the_table():
+    # would catch a misspelt name, which no table has
+    assert csv_columns([*ORDER, *COLUMNS, *COMPLETED]) == list(CSV_COLUMNS)
+    assert len(CSV_COLUMNS) <= 30
+    assert [name for name in CSV_COLUMNS if known_column(name) is None] == []
+    # as are the numbers that depend on the contact law, those of totals apart
+    assert BY_CONTACT - set(RESULTS) == {"worst_expected_impact_velocity"}
+
+
 def test_the_file_lists_columns_in_their_order_then_every_flag():
     names = ["rank", "gap", "required_gap_gem", "my_colour"]
     table = column_table(names).set_index("name")
     assert table.index.tolist() == [*names, *(f"flag_{name}" for name in FLAGS)]
     assert table.loc["gap", "unit"] == "m"
     assert table.loc["required_gap_gem", "meaning"].startswith("GEM building taxonomy")
+    # the text has few columns
+    assert table["in_csv"].tolist()[:4] == ["yes", "yes", "yes", "no"]
     # columns of the user's own
     assert table.loc["my_colour", "meaning"] == "carried through from the pair table"
     assert (table["meaning"] != "").all()

@@ -10,7 +10,7 @@ from per_obspy.config import Building, Codes, Screening
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.reliability import sd_error
-from per_obspy.screening.codes import rule_columns
+from per_obspy.screening.codes import code_rules, rule_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.design import DESIGN, LEADING, DesignSpectrum, design_table
 
@@ -31,8 +31,11 @@ def _pairs(**columns):
     return pd.DataFrame({"pair_id": names, **place}).assign(**given)
 
 
-def _table(pairs, screening=None):
-    return design_table(SPECTRUM, pairs, Building(), screening or Screening()).set_index("pair_id")
+ASCE = Screening(codes=Codes(rules=("asce7-16",)))
+
+
+def _table(pairs, screening=ASCE):
+    return design_table(SPECTRUM, pairs, Building(), screening).set_index("pair_id")
 
 
 def test_the_demand_by_hand():
@@ -173,7 +176,9 @@ def test_order_of_the_buildings_does_not_matter():
 
 
 def test_every_column_is_described():
-    table = _table(_pairs(), Screening(codes=Codes(gb_intensity=7))).reset_index()
+    every_rule = Codes(gb_intensity=7, rules=tuple(code_rules()["rule"]))
+    table = _table(_pairs(), Screening(codes=every_rule)).reset_index()
     described = {*RESULTS, *DESIGN, *rule_columns(), "pair_id", "gap"}
     rules = {name for name in table if name.startswith("required")}
+    assert len(rules) == len(every_rule.rules)
     assert {*LEADING, *rules} <= described

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
 from scipy.stats import norm
 from screening_samples import make_pairs, make_station
 from shakemap_samples import make_map
@@ -13,6 +14,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.assignment import assigned, stations_of
 from per_obspy.screening.design import DesignSpectrum, design_table
 from per_obspy.screening.population import gap_dispersion, median_gap
+from per_obspy.screening.ranking import in_order
 from per_obspy.screening.shakemap import shakemap_rows
 from per_obspy.screening.unknown_gaps import NUMBERS, TEXTS, UNKNOWN_CLASS, kept_apart
 
@@ -26,7 +28,7 @@ KINDS = [
 ]
 
 #: Columns that name the gap's consequences in words, or count rows.
-WORDS = {"rank", "state", "risk_class", "flags"}
+WORDS = {"rank", "state", "risk_class", "flags", "gap_suffices"}
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,7 @@ def station():
 
 def risk(station, gap, exact=True, building=None):
     """Return the risk table of all kinds of pairs with one gap, by pair."""
-    screening = Screening(exact=exact, codes=Codes(gb_intensity=8))
+    screening = Screening(exact=exact, codes=Codes(rules=["asce7-16", "gem"]))
     pairs = make_pairs([{**kind, "gap": gap} for kind in KINDS])
     table = per_obspy.risk_table(station, pairs, building or Building(), screening)
     return table.set_index("pair_id").sort_index()
@@ -99,12 +101,29 @@ def test_a_given_gap_is_kept_whatever_is_assumed(station):
     pd.testing.assert_frame_equal(table, risk(station, 0.05))
 
 
-def test_pairs_of_unknown_gap_follow_all_others_the_largest_demand_first(station):
-    gaps = [{"gap": np.nan, "period_1": 0.7}, {"gap": 9.0}, {"gap": np.nan, "period_1": 2.0}]
-    table = per_obspy.risk_table(station, make_pairs(gaps))
-    assert table["state"].tolist()[0] == "no"
-    assert set(table["state"].tolist()[1:]) == {"unknown"}
-    assert table["demand"].iloc[1] > table["demand"].iloc[2]
+def test_an_unknown_gap_is_ranked_by_what_it_needs_beside_the_others(station):
+    # would catch pairs that nobody has measured behind those that do not hit each other
+    gaps = [{"gap": gap, "period_1": period} for gap in (np.nan, 0.0, 9.0) for period in (0.6, 2.0)]
+    table = per_obspy.risk_table(station, make_pairs(gaps)).set_index(["pair_id"])
+    unknown, safe = table[table["state"] == "unknown"], table[table["state"] == "no"]
+    assert len(unknown) == len(safe) == 2
+    assert unknown["rank"].max() < safe["rank"].min()
+    # A velocity is a length times a frequency: twice the demand at the same periods, twice as much
+    order = in_order(unknown.reset_index().assign(demand=2 * unknown["demand"].to_numpy()))
+    before = in_order(unknown.reset_index())
+    assert_allclose(order["order_velocity"], 2 * before["order_velocity"])
+    # Not below its twin that touches by more than two deviations of the median, exp(-2 0.42)
+    touching = table[table["gap"] == 0.0].sort_values("period_1")
+    same = before.sort_values("period_1")
+    ratio = -same["order_velocity"].to_numpy() / touching["expected_impact_velocity"].to_numpy()
+    assert (np.log(ratio) > -0.84).all()
+
+
+def test_no_pair_of_known_gap_moves_because_of_unknown_ones(station):
+    known = [{"gap": gap, "period_1": 0.7} for gap in (0.0, 0.02, 0.05, 9.0)]
+    alone = per_obspy.risk_table(station, make_pairs(known))
+    both = per_obspy.risk_table(station, make_pairs([*known, {"gap": np.nan, "period_1": 0.9}]))
+    assert both[both["state"] != "unknown"]["pair_id"].tolist() == alone["pair_id"].tolist()
 
 
 def test_a_design_spectrum_gives_the_gap_needed():

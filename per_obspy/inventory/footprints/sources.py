@@ -121,6 +121,11 @@ def converted(attributes: pd.DataFrame, source: Source) -> pd.DataFrame:
 #: Tags of OpenStreetMap that are looked for in columns of several.
 _TAGS, _TAG_COLUMNS = ("height", "building:levels", "building"), ("other_tags", "tags")
 
+#: Tags of OpenStreetMap that say where a building is; a column without any is left out.
+_PLACES = ("name", *(f"addr:{part}" for part in (
+    "street", "housenumber", "housename", "neighbourhood", "suburb", "district", "city", "full",
+)))  # fmt: skip
+
 _HSTORE = re.compile(r'"(?P<key>(?:[^"\\]|\\.)*)"=>"(?P<value>(?:[^"\\]|\\.)*)"')
 
 
@@ -152,9 +157,12 @@ def _with_tags(table: pd.DataFrame, _: Source) -> pd.DataFrame:
     for column in _TAG_COLUMNS:
         if column in table:
             cells = [tags_of(cell) for cell in table[column]]
-            for tag in _TAGS:
+            for tag in (*_TAGS, *_PLACES):
                 values = pd.Series([tags.get(tag) for tags in cells], table.index, dtype=object)
-                table[tag] = table[tag].astype(object).fillna(values) if tag in table else values
+                if tag in table:
+                    table[tag] = table[tag].astype(object).fillna(values)
+                elif tag in _TAGS or values.notna().any():
+                    table[tag] = values
     # Ways have one identifier in GDAL's layers, relations another
     if "osm_way_id" in table:
         way = "w" + table["osm_way_id"].astype(str)

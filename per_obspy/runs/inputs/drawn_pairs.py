@@ -101,11 +101,11 @@ def write_search(found: "FootprintPairs", path: Path) -> "Search":
     from per_obspy.inventory.footprints.footprint_pairs import write_buildings
     from per_obspy.results.coverage import as_metadata, search_account
     from per_obspy.results.table_files import write_rejected
-    from per_obspy.runs.losses import cell_names
+    from per_obspy.results.totals import named_cells
 
     # What is left out belongs to the cells of a run's totals
     rejected, places = found.pairs.attrs["rejected"], found.left_out
-    areas = cell_names(places[:, 0], places[:, 1], Totals().cell) if len(places) else []
+    areas = list(named_cells(*places.T, Totals().cell).cell) if len(places) else []
     search = search_account(len(found.pairs), rejected, areas)
     write_pairs(found.pairs, path, as_metadata(search))
     write_buildings(found.buildings, path.with_suffix(".buildings.parquet"))

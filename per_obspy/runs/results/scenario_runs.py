@@ -13,6 +13,7 @@ from per_obspy.inventory.suspicions import ROW_SUSPICIONS
 from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import ROWS, table_files
+from per_obspy.results.totals import PLACE
 from per_obspy.runs.results.drawings import HISTORIES, pair_histories, station_rows
 from per_obspy.runs.results.report_files import outlines_beside
 from per_obspy.runs.stations import stations_of_earlier_run
@@ -103,8 +104,8 @@ class ScenarioRuns:
         """Return the columns that the ensemble takes from its first run."""
         if self.first is None:
             return []
-        area = self.first.settings.totals.area
-        wanted = dict.fromkeys([*OF_BUILDINGS, "flags", *([area] if area else [])])
+        area = self.first.settings.totals.area or PLACE
+        wanted = dict.fromkeys([*OF_BUILDINGS, "flags", area])
         known = set(pq.read_schema(self.first.risk[0].absolute()).names)
         # Names with a quotation mark are not quoted twice
         return [name for name in wanted if name in known and '"' not in name]

@@ -1,0 +1,207 @@
+"""
+Names of places: of the pair table, or of the nearest town.
+
+An assessor goes to "Cumhuriyet, 14. Sokak", not to a pair of coordinates. Columns with such names
+are known by their headings in the languages of ``words.csv`` and by the tags ``addr:*`` of
+OpenStreetMap; their texts are carried as they are. Towns are those of GeoNames with more than 1000
+people (CC BY 4.0), in the package ``reverse_geocode``.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from functools import cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy.errors import shortened
+from per_obspy.inventory.files.words import named, plain_word, words
+from per_obspy.inventory.schema import EMPTY
+from per_obspy.inventory.table_columns import metres_between
+
+Texts = NDArray[np.object_]
+
+#: Longest name of a place, characters.
+LONGEST = 200
+
+#: Distance from which on a town names no place, m.
+FAR = 100_000.0
+
+
+def place_columns(names: Iterable[str]) -> dict[str, tuple[str, int]]:
+    """
+    Return columns that say where a building is -> kind, and number of the building.
+
+    Kinds are ``neighbourhood, city, street, number, address, name``; the number is 0 for a column
+    of both buildings.
+
+    Examples
+    --------
+    >>> place_columns(["Mahalle", "addr:street_2", "Nombre 1", "gap"])
+    {'Mahalle': ('neighbourhood', 0), 'addr:street_2': ('street', 2), 'Nombre 1': ('name', 1)}
+    """
+    kinds = {name: _kind(name) for name in names}
+    return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def _kind(heading: str) -> tuple[str, int] | None:
+    """Return the kind of a place in a column, and the number of the building, None without one."""
+    tokens = re.findall(r"[^\W\d_]+|\d+", plain_word(heading[:LONGEST]))
+    side = next((int(token) for token in tokens if token in ("1", "2")), 0)
+    # A letter only at the end, as it may be a word
+    if not side and len(tokens) > 1 and tokens[-1] in ("a", "b"):
+        side, tokens = 1 + (tokens[-1] == "b"), tokens[:-1]
+    rest = [token for token in tokens if token not in ("1", "2")]
+    plain = [token for token in rest if token not in words("filler")]
+    for text in (" ".join(rest), " ".join(plain)):
+        if kind := _vocabulary().get(text):
+            return kind, side
+    return None
+
+
+@cache
+def _vocabulary() -> dict[str, str]:
+    """Return the words of a heading -> kind of a place."""
+    rows = named("place").items()
+    return {" ".join(re.findall(r"[^\W\d_]+", word)): kind for word, kind in rows}
+
+
+def place_names(pairs: pd.DataFrame) -> dict[str, Texts]:
+    """
+    Return the names of pairs and buildings by the columns of a pair table that say where they are.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        With any columns.
+
+    Returns
+    -------
+    names : dict of str to ndarray of str
+        ``place``: neighbourhood and street of the pair, those of building 1 where both differ;
+        empty where neither is known. ``name_1, name_2``, if a column has one: name of the building,
+        else street and house number, else address.
+    """
+    texts: dict[tuple[str, int], Texts] = {}
+    for name, kind in place_columns(map(str, pairs.columns)).items():
+        texts[kind] = _first(texts.get(kind), _texts(pairs[name]))
+    nothing = np.full(len(pairs), "", dtype=object)
+
+    def of_pair(kind: str) -> Texts:
+        return _first(*(texts.get((kind, side)) for side in (0, 1, 2)), nothing)
+
+    # A city alone is no place to go to
+    street = of_pair("street")
+    city = np.where(street == "", "", of_pair("city"))
+    place = _joined(", ", _first(of_pair("neighbourhood"), city), street)
+    names = {"place": _first(_texts(pairs["place"]), place) if "place" in pairs else place}
+    for i in (1, 2):
+        if any((kind, i) in texts for kind in ("name", "number", "address")):
+            number = texts.get(("number", i), nothing)
+            along = _first(texts.get(("street", i)), texts.get(("street", 0)), nothing)
+            house = np.where(number == "", "", _joined(" ", along, number))
+            names[f"name_{i}"] = _first(
+                texts.get(("name", i)), house, texts.get(("address", i)), nothing
+            )
+    return names
+
+
+def _texts(column: pd.Series) -> Texts:
+    """Return the cells of a column as texts; each different cell is written once."""
+    codes, cells = pd.factorize(column)
+    texts = [_text(cell) for cell in cells]
+    return np.array([*texts, ""], dtype=object)[codes]
+
+
+def _text(cell: object) -> str:
+    """Return a cell as the text of a name, empty if it has none; numbers of houses are whole."""
+    whole = isinstance(cell, float) and cell.is_integer()
+    text = shortened(" ".join(f"{cell:.0f}" if whole else str(cell).split()), LONGEST)
+    return "" if text.lower() in EMPTY else text
+
+
+def _first(*texts: Texts | None) -> Texts:
+    """Return the first text of each row that is not empty."""
+    known = [each for each in texts if each is not None]
+    first = known[0]
+    for other in known[1:]:
+        first = np.where(first == "", other, first)
+    return first
+
+
+def _joined(mark: str, first: Texts, second: Texts) -> Texts:
+    """Return two texts of each row with a mark between them, or the one that is not empty."""
+    both = (first != "") & (second != "")
+    return np.where(both, first + mark + second, first + second)
+
+
+def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) -> Texts:
+    """
+    Return the name of the nearest town for each place, with the way from there.
+
+    Parameters
+    ----------
+    longitude, latitude : (n_places,) array_like
+        Degrees east and north.
+    size : float
+        Length by which places are told apart, m.
+
+    Returns
+    -------
+    names : (n_places,) ndarray of str
+        As in the example; degrees where no town is within 100 km.
+
+    Examples
+    --------
+    >>> near_towns([36.93, -150.0], [37.60, 10.0]).tolist()
+    ['Kahramanmaraş (1.7 km N, 0.3 km E)', '10.000 N, 150.000 W']
+    """
+    import reverse_geocode
+
+    east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
+    if not east.size:
+        return np.empty(0, dtype=object)
+    towns = reverse_geocode.search(list(zip(north.tolist(), east.tolist(), strict=True)))
+    at_east, at_north = np.array([(town["longitude"], town["latitude"]) for town in towns]).T
+    away = metres_between(at_east, at_north, east, north)
+    decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
+    names = [
+        _way(town["city"], way, decimals) if math.hypot(*way) < FAR else _degrees(*place, decimals)
+        for town, way, place in zip(
+            towns,
+            zip(*(each.tolist() for each in away), strict=True),
+            zip(east.tolist(), north.tolist(), strict=True),
+            strict=True,
+        )
+    ]
+    return np.array(names, dtype=object)
+
+
+def _way(town: str, way: tuple[float, float], decimals: int) -> str:
+    """Return a town and the way east and north from it, m."""
+    east, north = (round(part / 1000.0, decimals) for part in way)
+    parts = [
+        f"{abs(part):.{decimals}f} km {sides[part < 0]}"
+        for part, sides in ((north, "NS"), (east, "EW"))
+        if part
+    ]
+    return f"{town} ({', '.join(parts)})" if parts else town
+
+
+def _degrees(east: float, north: float, decimals: int) -> str:
+    """Return a place in degrees."""
+    # A degree is 111 km
+    digits, east = decimals + 2, (east + 180.0) % 360.0 - 180.0
+    sides = "NS"[north < 0], "EW"[east < 0]
+    return f"{abs(north):.{digits}f} {sides[0]}, {abs(east):.{digits}f} {sides[1]}"
+
+
+def with_towns(place: ArrayLike, longitude: ArrayLike, latitude: ArrayLike) -> Texts:
+    """Return places with the nearest town where they are empty; degrees east and north."""
+    texts = pd.Series(place, dtype=object).fillna("").to_numpy(dtype=object, copy=True)
+    east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
+    empty = (texts == "") & np.isfinite(east) & np.isfinite(north)
+    texts[empty] = near_towns(east[empty], north[empty])
+    return texts
