@@ -21,7 +21,12 @@ from per_obspy.inventory.contact_height import (
     floor_offset,
     floors_misaligned,
 )
-from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
+from per_obspy.inventory.periods import (
+    asce7_period,
+    ec8_period,
+    period_correlation,
+    period_log_std,
+)
 from per_obspy.inventory.table_columns import joined_names, numbers_in
 
 #: Periods from heights in m and structural systems, by the name of the formula.
@@ -47,8 +52,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     pairs : DataFrame
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
-        yield_displacement, hardening``; for the pair ``longitude, latitude, azimuth,
-        contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
+        yield_displacement, hardening``; for the pair ``period_correlation, longitude, latitude,
+        azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
         names of the derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
@@ -69,6 +74,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * A height from storeys has the deviation of the storey height, and with it that of the storeys
       where the table gives ``height_log_std``. A derived period has the height's deviation too.
     * A height with a deviation is an estimate and counts as derived.
+    * Periods of which one is given have uncorrelated deviations, unless the table gives a
+      correlation.
     """
     table = _Columns(pairs)
     # Masonry and anything unknown
@@ -82,6 +89,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         _add_size(table, i, building)
         _add_period(table, i, building, systems[f"system_{i}"].to_numpy(dtype=str))
         _add_strength(table, i)
+    _add_period_correlation(table, *systems.values())
     _add_contact(table, building)
     _add_gap(table, building)
     for i in (1, 2):
@@ -160,6 +168,15 @@ def _add_period(
         spread = np.where(np.isnan(table.given(f"{name}_{i}")), deviation, 0.0)
         table.fill(f"{name}_{i}", value)
         table.columns[f"{name}_log_std_{i}"] = table.given(f"{name}_log_std_{i}", spread)
+
+
+def _add_period_correlation(table: _Columns, *systems: pd.Series) -> None:
+    """Add the correlation of the residuals of both periods; 0 where one of them is given."""
+    storeys = (table.columns[f"storeys_{i}"] for i in (1, 2))
+    both_derived = table.derived["period_1"] & table.derived["period_2"]
+    likeness = np.where(both_derived, period_correlation(*systems, *storeys), 0.0)
+    table.fill("period_correlation", likeness)
+    table.derived["period_correlation"] &= both_derived
 
 
 def _add_strength(table: _Columns, i: int) -> None:

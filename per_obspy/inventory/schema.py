@@ -103,6 +103,9 @@ _PAIR = (
     Column("same_property", "str", "",
            "whether both buildings are within one property; code rules take the larger gap where "
            "it is empty", choices=ONE_PROPERTY),
+    Column("period_correlation", "float64", "1",
+           "correlation of the uncertainties of both periods; alike neighbours miss a period "
+           "formula alike", low=0.0, high=1.0, hint="a fraction is expected, not per cent"),
     Column("restitution", "float64", "1", "coefficient of restitution of impact",
            low=0.0, high=1.0, hint="a fraction is expected, not per cent"),
     Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground",

@@ -124,6 +124,7 @@ NEEDED_OF_BUILDING = (
 NEEDED = (
     *PAIR,
     *("gap_std", "assumed_gap", "absolute_gap", "demand_rule", "demand_exact"),
+    "period_correlation",
     *("correlation", "correlation_record", "correlation_linearized", "impact_velocity_exact"),
     *(f"{name}_{i}" for name in NEEDED_OF_BUILDING for i in (1, 2)),
 )

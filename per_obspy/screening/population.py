@@ -12,7 +12,8 @@ A node is as uncertain as everything but the buildings is, or as the spread of t
 root of their number where that is more. The spread is the smaller one of the standard deviation and
 that of a normal variable of the same quartiles: few nodes far off do not count.
 
-Periods and dampings are lognormal, independent in both buildings. One node serves all pairs
+Periods and dampings are lognormal. Those of both buildings are independent, but for periods with a
+``period_correlation``: alike neighbours miss a period formula alike. One node serves all pairs
 alike, so that a row does not depend on the other pairs.
 
 Two oscillators whose relative displacement would reach D and whose relative velocity V hit at a gap
@@ -85,8 +86,12 @@ LARGEST_DAMPING = 0.99
 
 def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
     """Return the lognormal period of building i at the nodes, (n_pairs, n_nodes), s."""
-    deviation = values(table, f"period_log_std_{i}")
-    period: FloatArray = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 2]))
+    deviate = nodes[None, :, 0]
+    if i == 2:
+        shared = values(table, "period_correlation")[:, None]
+        deviate = shared * deviate + np.sqrt(1.0 - shared**2) * nodes[:, 2]
+    deviation = values(table, f"period_log_std_{i}")[:, None]
+    period: FloatArray = median[:, None] * np.exp(deviation * deviate)
     return period
 
 
@@ -374,9 +379,9 @@ def estimated_motion(
     )
     relative = np.empty((MOTION_ROWS, motion.row.size, len(nodes)))
     deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
-    estimate_motion(
-        *spectra, motion.row, np.stack([*first, *second]), np.atleast_1d(shift), deviates, relative
-    )
+    both_buildings = np.stack([*first, *second])
+    correlations = np.stack([np.atleast_1d(shift), values(pairs, "period_correlation")])
+    estimate_motion(*spectra, motion.row, both_buildings, correlations, deviates, relative)
     return RelativeMotion(*relative)
 
 

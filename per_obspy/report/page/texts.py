@@ -267,6 +267,7 @@ ENGLISH: dict[str, str] = {
     # Inputs
     "input_system": "structural system",
     "input_period": "period",
+    "input_period_correlation": "likeness of both periods",
     "input_damping": "damping",
     "input_mass": "mass",
     "input_area": "floor area",

@@ -263,6 +263,7 @@ SPANISH: dict[str, str] = {
     "show_pairs": "filtrar sus pares",
     "input_system": "sistema estructural",
     "input_period": "período",
+    "input_period_correlation": "semejanza de ambos períodos",
     "input_damping": "amortiguamiento",
     "input_mass": "masa",
     "input_area": "área de planta",
