@@ -53,8 +53,9 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         yield_displacement, hardening``; for the pair ``period_correlation, longitude, latitude,
-        azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
-        names of the derived columns, separated by blanks, empty if none. Units as in the schema.
+        azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and
+        ``derived``: the names of the derived columns, separated by blanks, empty if none. Units as
+        in the schema.
 
     Notes
     -----

@@ -1,9 +1,10 @@
 """
 Estimated motion of pairs without contact at nodes of their buildings.
 
-Periods and dampings are lognormal, the periods of both buildings correlated. A radius changes as the stored spectrum does, which is bilinear
-in ln period and ln damping; eq. (15) and (16) give the relative motion. The nodes of a pair share
-one row, so that loops without branches over them become vectors.
+Periods and dampings are lognormal, the periods of both buildings correlated. A radius changes as
+the stored spectrum does, which is bilinear in ln period and ln damping; eq. (15) and (16) give the
+relative motion. The nodes of a pair share one row, so that loops without branches over them become
+vectors.
 """
 
 import math
