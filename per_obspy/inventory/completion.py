@@ -27,6 +27,7 @@ from per_obspy.inventory.periods import (
     period_correlation,
     period_log_std,
 )
+from per_obspy.inventory.strength import hazus_yield_displacement
 from per_obspy.inventory.table_columns import joined_names, numbers_in
 
 #: Periods from heights in m and structural systems, by the name of the formula.
@@ -52,10 +53,10 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     pairs : DataFrame
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
-        yield_displacement, hardening``; for the pair ``period_correlation, longitude, latitude,
-        azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and
-        ``derived``: the names of the derived columns, separated by blanks, empty if none. Units as
-        in the schema.
+        hazus_yield, yield_displacement, hardening``; for the pair ``period_correlation, longitude,
+        latitude, azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution``
+        and ``derived``: the names of the derived columns, separated by blanks, empty if none.
+        Units as in the schema.
 
     Notes
     -----
@@ -82,14 +83,15 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     # Masonry and anything unknown
     systems = {}
     for i in (1, 2):
-        system = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
-        table.derived[f"system_{i}"] = (system == "").to_numpy(dtype=bool)
-        systems[f"system_{i}"] = system.where(system != "", "other")
+        given = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
+        table.derived[f"system_{i}"] = (given == "").to_numpy(dtype=bool)
+        systems[f"system_{i}"] = given.where(given != "", "other")
     # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
         _add_size(table, i, building)
-        _add_period(table, i, building, systems[f"system_{i}"].to_numpy(dtype=str))
-        _add_strength(table, i)
+        system = systems[f"system_{i}"].to_numpy(dtype=str)
+        _add_period(table, i, building, system)
+        _add_strength(table, i, building, system)
     _add_period_correlation(table, *systems.values())
     _add_contact(table, building)
     _add_gap(table, building)
@@ -180,8 +182,17 @@ def _add_period_correlation(table: _Columns, *systems: pd.Series) -> None:
     table.derived["period_correlation"] &= both_derived
 
 
-def _add_strength(table: _Columns, i: int) -> None:
-    """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
+def _add_strength(
+    table: _Columns, i: int, building: config.Building, system: NDArray[np.str_]
+) -> None:
+    """
+    Add yield displacement, m, and hardening of building i; infinite and 0 where unknown.
+
+    The yield displacement of HAZUS is beside them, by which a building without one is judged.
+    """
+    table.columns[f"hazus_yield_{i}"] = hazus_yield_displacement(
+        table.columns[f"period_{i}"], system, table.storeys(i), building.code_level
+    )
     # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
     share = np.nan_to_num(effective_mass_ratio(table.storeys(i)), nan=1.0)
     coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY

@@ -202,6 +202,12 @@ COMPLETED: dict[str, Column] = {
                    f"building {i}: generalised first-mode mass at contact height")
             for i in (1, 2)
         ),
+        *(
+            Column(f"hazus_yield_{i}", "float64", "m",
+                   f"building {i}: yield displacement of the oscillator by HAZUS, for its system, "
+                   "storeys and the assumed code level; empty where the system is unknown")
+            for i in (1, 2)
+        ),
         Column(
             "floors_misaligned",
             "bool",

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import xarray as xr
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
 from per_obspy.inventory.table_columns import joined_names
@@ -24,6 +25,20 @@ def period_is_derived(pairs: Table) -> BoolArray:
     # Many rows share few different texts: each text is searched once
     has_period = {text: "period_1" in text or "period_2" in text for text in set(derived)}
     return np.fromiter(map(has_period.__getitem__, derived), bool, len(derived))
+
+
+def elastic_ratios(table: Table) -> dict[str, FloatArray]:
+    """
+    Return the elastic displacement of both buildings over their yield displacement by HAZUS.
+
+    NaN where the pair table gives a yield value, or the system is unknown.
+    """
+    ratios = {}
+    for i in (1, 2):
+        ratio = values(table, f"sd_{i}") / values(table, f"hazus_yield_{i}")
+        is_linear = np.isinf(values(table, f"yield_displacement_{i}"))
+        ratios[f"elastic_ratio_{i}"] = np.where(is_linear, ratio, np.nan)
+    return ratios
 
 
 def joined_flags(raised: Mapping[str, BoolArray]) -> TextArray:
@@ -47,6 +62,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "unknown_gap": np.asarray(unknown, dtype=bool),
         "doubtful_cell": has_note,
         "touching": gap == 0.0,
+        "beyond_elastic": np.fmax(*both(table, "elastic_ratio")) > 1.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": period_is_derived(table),

@@ -8,6 +8,7 @@ from per_obspy.config import Screening, States
 from per_obspy.config.screening import EVERY_STATE as EVERY_STATE
 from per_obspy.config.screening import STATES as STATES
 from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
+from per_obspy.screening.flags import elastic_ratios
 from per_obspy.screening.values import Columns, IndexArray, TextArray, values
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
@@ -72,14 +73,16 @@ def risk_class(velocity: FloatArray, classes: dict[str, float]) -> TextArray:
 
 def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     """
-    Return gap over demand, state and risk class of rows; the population alone decides the latter.
+    Return gap over demand, elastic over yield displacements, state and risk class of rows.
 
-    The ratio is 0 for touching pairs and NaN (an empty cell) where the demand is 0.
+    The population alone decides the last two. The first ratio is 0 for touching pairs and NaN (an
+    empty cell) where the demand is 0.
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     nothing = np.full(demand.shape, np.nan)
     return {
         "demand_ratio": np.divide(gap, demand, out=nothing, where=demand > 0),
+        **elastic_ratios(table),
         "state": pounding_state(values(table, "probability"), screening.states),
         "risk_class": risk_class(values(table, "expected_impact_velocity"), screening.classes),
     }

@@ -324,6 +324,10 @@ SPANISH: dict[str, str] = {
         "separación menor que 0.6 de la demanda: probablemente varios impactos, el golpe único "
         "puede quedar corto"
     ),
+    "flag_beyond_elastic": (
+        "un edificio fluiría, lo que no se modela: su desplazamiento elástico es elastic_ratio "
+        "veces el de fluencia de HAZUS para su sistema, sus pisos y el nivel de código supuesto"
+    ),
     "flag_outside_usable_periods": (
         "el período de un edificio está fuera de los períodos utilizables del registro"
     ),
@@ -433,6 +437,7 @@ SPANISH: dict[str, str] = {
     "flagname_doubtful_cell": "celda dudosa",
     "flagname_touching": "en contacto",
     "flagname_single_hit_unreliable": "golpe único poco confiable",
+    "flagname_beyond_elastic": "más allá de lo elástico",
     "flagname_outside_usable_periods": "fuera de períodos utilizables",
     "flagname_per_far_above_sd": "PER muy sobre SD",
     "flagname_far_station": "estación lejana",
