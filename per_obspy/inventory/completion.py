@@ -30,6 +30,10 @@ from per_obspy.inventory.periods import (
 from per_obspy.inventory.strength import hazus_yield_displacement
 from per_obspy.inventory.table_columns import joined_names, numbers_in
 
+#: Log-standard deviation of the impact velocity of a pair by the contact law, where the restitution
+#: is assumed (docs/reliability.md).
+CONTACT_LOG_STD = 0.1
+
 #: Periods from heights in m and structural systems, by the name of the formula.
 _FORMULAS: dict[str, Callable[[FloatArray, NDArray[np.str_]], FloatArray]] = {
     "asce7": asce7_period,
@@ -54,7 +58,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         hazus_yield, yield_displacement, hardening``; for the pair ``period_correlation, longitude,
-        latitude, azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution``
+        latitude, azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution,
+        contact_log_std``
         and ``derived``: the names of the derived columns, separated by blanks, empty if none.
         Units as in the schema.
 
@@ -221,6 +226,9 @@ def _add_contact(table: _Columns, building: config.Building) -> None:
     offset = np.where(np.isnan(sizes).any(axis=0), np.nan, floor_offset(*sizes))
     table.fill("floor_offset", offset)
     table.fill("restitution", building.restitution)
+    # A given restitution is that of an instant impact
+    deviation = np.where(table.derived["restitution"], CONTACT_LOG_STD, 0.0)
+    table.columns["contact_log_std"] = table.given("contact_log_std", deviation)
 
 
 def _add_gap(table: _Columns, building: config.Building) -> None:

@@ -65,13 +65,13 @@ from per_obspy.screening.values import (
 )
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
-#: given buildings, and of ln gap: the second 128 Sobol points, which lie in the middle of their
-#: strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at
-#: some nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(6, scramble=False).fast_forward(128).random(128))
+#: given buildings, of ln gap, and of ln impact velocity by the contact: the second 128 Sobol
+#: points, which lie in the middle of their strata. On a grid, or at the first 128, equal buildings
+#: would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(7, scramble=False).fast_forward(128).random(128))
 
-#: Columns of ``NODES``: both buildings, demand, gap.
-BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
+#: Columns of ``NODES``: both buildings, demand, gap, contact.
+BUILDINGS, DEMAND, GAP, CONTACT = slice(0, 4), 4, 5, 6
 
 #: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
 #: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
@@ -247,9 +247,10 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
             *(median_gap(pairs), gap_dispersion(pairs)),
             *(uncertain.log_std, uncertain.velocity_factor),
             *_received(pairs),
+            values(pairs, "contact_log_std"),
         ]
     )
-    deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP]].T)
+    deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP, CONTACT]].T)
     # one node of certain buildings is all nodes
     every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
     # always writable: a read-only array would compile the kernel a second time
