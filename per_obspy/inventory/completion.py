@@ -27,7 +27,11 @@ from per_obspy.inventory.periods import (
     period_correlation,
     period_log_std,
 )
-from per_obspy.inventory.strength import hazus_yield_displacement
+from per_obspy.inventory.strength import (
+    CAPACITY_LOG_STD,
+    hazus_hardening,
+    hazus_yield_displacement,
+)
 from per_obspy.inventory.table_columns import joined_names, numbers_in
 
 #: Log-standard deviation of the impact velocity of a pair by the contact law, where the restitution
@@ -57,11 +61,10 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     pairs : DataFrame
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
-        hazus_yield, yield_displacement, hardening``; for the pair ``period_correlation, longitude,
-        latitude, azimuth, contact_height, floor_offset, floors_misaligned, gap_std, restitution,
-        contact_log_std``
-        and ``derived``: the names of the derived columns, separated by blanks, empty if none.
-        Units as in the schema.
+        hazus_yield, yield_displacement, yield_log_std, hardening``; for the pair
+        ``period_correlation, longitude, latitude, azimuth, contact_height, floor_offset,
+        floors_misaligned, gap_std, restitution, contact_log_std`` and ``derived``: the names of the
+        derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
     -----
@@ -72,7 +75,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * A yield coefficient is a share of the total weight. The yield displacement of the oscillator
       follows from it with the effective mass of a first mode that grows linearly with height, all
       the mass where neither height nor storeys are known.
-    * A building without yield displacement and yield coefficient stays linear (infinite yield
+    * A building without yield displacement and yield coefficient has the strength of HAZUS if
+      ``building.strength`` says so and its system is known, else it stays linear (infinite yield
       displacement); a pair without azimuth keeps NaN, which means every direction. Neither counts
       as derived.
     * An empty gap is a lognormal one of the median and deviation in ``building``, if it has one;
@@ -195,16 +199,25 @@ def _add_strength(
 
     The yield displacement of HAZUS is beside them, by which a building without one is judged.
     """
-    table.columns[f"hazus_yield_{i}"] = hazus_yield_displacement(
-        table.columns[f"period_{i}"], system, table.storeys(i), building.code_level
+    period, storeys, name = (
+        table.columns[f"period_{i}"],
+        table.storeys(i),
+        f"yield_displacement_{i}",
     )
+    assumed = hazus_yield_displacement(period, system, storeys, building.code_level)
+    table.columns[f"hazus_yield_{i}"] = assumed
     # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
-    share = np.nan_to_num(effective_mass_ratio(table.storeys(i)), nan=1.0)
+    share = np.nan_to_num(effective_mass_ratio(storeys), nan=1.0)
     coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
-    radius = (table.columns[f"period_{i}"] / 2 / np.pi) ** 2
-    strength = table.fill(f"yield_displacement_{i}", coefficient * radius)
-    table.columns[f"yield_displacement_{i}"] = np.where(np.isnan(strength), np.inf, strength)
-    table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", 0.0)
+    strength = table.given(name, coefficient * (period / 2 / np.pi) ** 2)
+    is_assumed = np.isnan(strength) & ~np.isnan(assumed) & (building.strength == "hazus")
+    strength = table.fill(name, np.where(is_assumed, assumed, strength))
+    table.columns[name] = np.where(np.isnan(strength), np.inf, strength)
+    # Deviation and hardening of an assumed strength
+    hardening = np.where(is_assumed, hazus_hardening(system, storeys), 0.0)
+    table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", hardening)
+    spread = np.where(is_assumed, CAPACITY_LOG_STD, 0.0)
+    table.columns[f"yield_log_std_{i}"] = table.given(f"yield_log_std_{i}", spread)
 
 
 def _add_contact(table: _Columns, building: config.Building) -> None:

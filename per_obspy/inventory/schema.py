@@ -157,6 +157,8 @@ _BUILDING = (
     Column("yield_displacement", "float64", "m",
            "yield displacement of the equivalent oscillator; infinite if it stays "
            "linear", low=TINY),
+    Column("yield_log_std", "float64", "1",
+           "logarithmic standard deviation of the yield displacement", low=0.0, high=2.0),
     Column("yield_coefficient", "float64", "1",
            "base shear at yield / total weight of the building; the oscillator yields at that over "
            "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",

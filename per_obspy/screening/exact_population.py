@@ -40,6 +40,7 @@ from per_obspy.screening.population import (
     COLUMNS,
     NODES,
     SAMPLES,
+    STRENGTH,
     RelativeMotion,
     Uncertain,
     UncertainMotion,
@@ -118,7 +119,8 @@ BUILDING = ("participation", "yield_displacement", "hardening", "per", "contact_
 #: Columns of one building from which a population follows.
 NEEDED_OF_BUILDING = (
     *BUILDING,
-    *("period", "damping", "period_log_std", "damping_log_std", "amplification_exact"),
+    *("period", "damping", "period_log_std", "damping_log_std", "yield_log_std"),
+    "amplification_exact",
     *("equivalent_period", "equivalent_damping", "equivalent_per"),
 )
 
@@ -369,6 +371,9 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
         period = period_at_nodes(values(table, f"period_{i}"), table, i, nodes)
         damping = damping_at_nodes(values(table, f"damping_{i}"), table, i, nodes)
         sample[f"period_{i}"], sample[f"damping_{i}"] = period.ravel(), damping.ravel()
+        # an infinite yield displacement stays so
+        deviation = np.outer(values(table, f"yield_log_std_{i}"), nodes[:, STRENGTH[i - 1]])
+        sample[f"yield_displacement_{i}"] *= np.exp(deviation).ravel()
     return sample
 
 

@@ -65,13 +65,13 @@ from per_obspy.screening.values import (
 )
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
-#: given buildings, of ln gap, and of ln impact velocity by the contact: the second 128 Sobol
-#: points, which lie in the middle of their strata. On a grid, or at the first 128, equal buildings
-#: would be exactly equal, and in step, at some nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(7, scramble=False).fast_forward(128).random(128))
+#: given buildings, of ln gap, of ln impact velocity by the contact, and of ln yield displacement of
+#: both buildings: the second 128 Sobol points, which lie in the middle of their strata. On a grid,
+#: or at the first 128, equal buildings would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(9, scramble=False).fast_forward(128).random(128))
 
-#: Columns of ``NODES``: both buildings, demand, gap, contact.
-BUILDINGS, DEMAND, GAP, CONTACT = slice(0, 4), 4, 5, 6
+#: Columns of ``NODES``: both buildings, demand, gap, contact, strength of building 1 and 2.
+BUILDINGS, DEMAND, GAP, CONTACT, STRENGTH = slice(0, 4), 4, 5, 6, (7, 8)
 
 #: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
 #: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
@@ -104,10 +104,9 @@ def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray
 
 
 def building_is_uncertain(pairs: Table) -> BoolArray:
-    """Return a mask of pairs in which a period or damping has a log-standard deviation."""
-    period = np.maximum(*both(pairs, "period_log_std"))
-    damping = np.maximum(*both(pairs, "damping_log_std"))
-    return np.asarray((period > 0) | (damping > 0))
+    """Return a mask of pairs in which period, damping or strength has a log-standard deviation."""
+    deviations = ("period_log_std", "damping_log_std", "yield_log_std")
+    return np.any([np.maximum(*both(pairs, name)) > 0 for name in deviations], axis=0)
 
 
 def gap_dispersion(pairs: Table) -> FloatArray:

@@ -25,7 +25,10 @@ from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
-LOGNORMAL = ("period_1", "period_2", "damping_1", "damping_2")
+LOGNORMAL = (
+    *("period_1", "period_2", "damping_1", "damping_2"),
+    *("yield_displacement_1", "yield_displacement_2"),
+)
 
 #: Standard deviation of Fisher's z of a derived correlation of both periods. Reasoned: one step of
 #: likeness, from 0.5 down to 0 and up to 0.82.
@@ -150,15 +153,19 @@ def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFra
     changed = given.assign(**{name: value})
     if name == "period_correlation":
         return changed
-    deviation = "gap_std" if name == "gap" else name.replace("_", "_log_std_")
-    return changed.assign(**{deviation: 0.0})
+    return changed.assign(**{"gap_std" if name == "gap" else _deviation(name): 0.0})
+
+
+def _deviation(name: str) -> str:
+    """Return the column of the log-standard deviation of an input of a building."""
+    return f"{name.split('_')[0]}_log_std_{name[-1]}"
 
 
 def _ends(rows: pd.DataFrame) -> dict[str, Ends]:
     """Return the lower and the upper value of each input, and the rows in which it is uncertain."""
     ends = {}
     for name in LOGNORMAL:
-        deviation = np.nan_to_num(values(rows, name.replace("_", "_log_std_")))
+        deviation = np.nan_to_num(values(rows, _deviation(name)))
         median, spread = values(rows, name), np.exp(deviation)
         # A damping stays below the critical one, as at the nodes
         largest = np.maximum(median, LARGEST_DAMPING) if "damping" in name else np.inf

@@ -89,6 +89,24 @@ def test_periods_of_alike_neighbours_are_correlated():
     assert derived == [True, True, True, False, False, True]
 
 
+def test_hazus_gives_a_strength_to_known_systems_without_one():
+    rows = [{"system_1": "concrete_mrf"}, {"system_1": ""}, {"yield_coefficient_1": 0.2}]
+    given = {"system_1": "concrete_mrf", "system_2": "", "storeys_1": 5.0, "period_1": 0.75}
+    table = pd.DataFrame([PLACE | SIZES | given | row for row in rows])
+    linear = completed_pairs(table, Building())
+    complete = completed_pairs(table, Building(strength="hazus"))
+    # HAZUS-MH, C1M, moderate code: 0.58 inches at 0.75 s, two digits each, the period squared
+    assert linear["yield_displacement_1"].tolist()[:2] == [np.inf, np.inf]
+    assert_allclose(complete["yield_displacement_1"][0], 0.58 * 0.0254, rtol=0.02)
+    assert_allclose(complete["hardening_1"], [0.18, 0.0, 0.0])
+    assert complete["yield_log_std_1"].tolist() == [0.4, 0.0, 0.0]
+    marked = ["yield_displacement_1" in text.split() for text in complete["derived"]]
+    assert marked == [True, False, True]
+    # a given strength stays, an unknown system is linear
+    assert complete["yield_displacement_1"][1] == complete["yield_displacement_2"][0] == np.inf
+    assert complete["yield_displacement_1"][2] == linear["yield_displacement_1"][2]
+
+
 def test_marks_belong_to_their_row():
     # would catch marks of one row written into another
     table = pd.DataFrame([PLACE | SIZES, PLACE | SIZES | {"period_1": 0.5}, PLACE | SIZES])

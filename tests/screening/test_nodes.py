@@ -19,6 +19,8 @@ PAIRS = {
     "damping_log_std_1": np.array([5.0, 0.0]),
     "period_log_std_2": np.array([0.0, 0.0]),
     "damping_log_std_2": np.array([0.0, 0.0]),
+    "yield_log_std_1": np.array([0.0, 0.0]),
+    "yield_log_std_2": np.array([0.0, 0.0]),
     "period_correlation": np.array([0.0, 0.0]),
 }
 
@@ -26,7 +28,7 @@ PAIRS = {
 def test_nodes_are_those_of_independent_standard_normal_variables():
     # 128 quasi-random nodes: mean, variance and covariance within a few hundredths
     assert_allclose(NODES.mean(axis=0), 0, atol=0.03)
-    assert_allclose(np.cov(NODES.T), np.eye(7), atol=0.1)
+    assert_allclose(np.cov(NODES.T), np.eye(9), atol=0.1)
 
 
 def test_the_first_nodes_have_the_moments_too():
