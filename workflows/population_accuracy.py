@@ -121,6 +121,9 @@ def drawn(station: xr.Dataset, pair: pd.Series, random: np.random.Generator) -> 
     """Return the columns of a population from exact histories of drawn buildings and gaps."""
     count = YIELDING_DRAWS if pair["kind"] == KINDS[3] else DRAWS
     normal = random.normal(size=(5, count))
+    # alike neighbours miss a period formula alike
+    shared = pair["period_correlation"]
+    normal[2] = shared * normal[0] + np.sqrt(1.0 - shared**2) * normal[2]
     row = pd.DataFrame([pair])
     gap = median_gap(row)[0] * np.exp(gap_dispersion(row)[0] * normal[4])
     oscillators = []

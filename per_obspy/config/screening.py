@@ -78,6 +78,20 @@ class Building(Section):
         le=12,
         description="largest difference of floor levels that count as aligned, m; 2 ft: FEMA P-154",
     )
+    strength: Literal["none", "hazus"] = Field(
+        "none",
+        description=(
+            "strength of buildings without a yield value: none (they stay linear) or hazus (yield "
+            "and ultimate capacity by system, storeys and code_level); slower"
+        ),
+    )
+    code_level: Literal["low", "moderate", "high"] = Field(
+        "moderate",
+        description=(
+            "HAZUS code level of the strength of buildings without a yield value: low, moderate "
+            "or high"
+        ),
+    )
     period_formula: str = Field(
         "asce7",
         pattern="^(asce7|ec8)$",

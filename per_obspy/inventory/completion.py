@@ -21,9 +21,23 @@ from per_obspy.inventory.contact_height import (
     floor_offset,
     floors_misaligned,
 )
-from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
+from per_obspy.inventory.periods import (
+    asce7_period,
+    ec8_period,
+    period_correlation,
+    period_log_std,
+)
 from per_obspy.inventory.places import place_names
+from per_obspy.inventory.strength import (
+    CAPACITY_LOG_STD,
+    hazus_hardening,
+    hazus_yield_displacement,
+)
 from per_obspy.inventory.table_columns import joined_names, numbers_in
+
+#: Log-standard deviation of the impact velocity of a pair by the contact law, where the restitution
+#: is assumed (docs/reliability.md).
+CONTACT_LOG_STD = 0.1
 
 #: Periods from heights in m and structural systems, by the name of the formula.
 _FORMULAS: dict[str, Callable[[FloatArray, NDArray[np.str_]], FloatArray]] = {
@@ -48,10 +62,11 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     pairs : DataFrame
         All columns of the input and, for each building, ``storeys, height, height_log_std, system,
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
-        yield_displacement, hardening``; for the pair ``longitude, latitude, azimuth,
-        contact_height, floor_offset, floors_misaligned, gap_std, restitution``, ``place`` and
-        names of buildings by :func:`~per_obspy.inventory.places.place_names`, and ``derived``: the
-        names of the derived columns, separated by blanks, empty if none. Units as in the schema.
+        hazus_yield, yield_displacement, yield_log_std, hardening``; for the pair
+        ``period_correlation, longitude, latitude, azimuth, contact_height, floor_offset,
+        floors_misaligned, gap_std, restitution, contact_log_std``, ``place`` and names of buildings
+        by :func:`~per_obspy.inventory.places.place_names`, and ``derived``: the names of the
+        derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
     -----
@@ -62,7 +77,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * A yield coefficient is a share of the total weight. The yield displacement of the oscillator
       follows from it with the effective mass of a first mode that grows linearly with height, all
       the mass where neither height nor storeys are known.
-    * A building without yield displacement and yield coefficient stays linear (infinite yield
+    * A building without yield displacement and yield coefficient has the strength of HAZUS if
+      ``building.strength`` says so and its system is known, else it stays linear (infinite yield
       displacement); a pair without azimuth keeps NaN, which means every direction. Neither counts
       as derived.
     * An empty gap is a lognormal one of the median and deviation in ``building``, if it has one;
@@ -71,19 +87,23 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * A height from storeys has the deviation of the storey height, and with it that of the storeys
       where the table gives ``height_log_std``. A derived period has the height's deviation too.
     * A height with a deviation is an estimate and counts as derived.
+    * Periods of which one is given have uncorrelated deviations, unless the table gives a
+      correlation.
     """
     table = _Columns(pairs)
     # Masonry and anything unknown
     systems = {}
     for i in (1, 2):
-        system = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
-        table.derived[f"system_{i}"] = (system == "").to_numpy(dtype=bool)
-        systems[f"system_{i}"] = system.where(system != "", "other")
+        given = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
+        table.derived[f"system_{i}"] = (given == "").to_numpy(dtype=bool)
+        systems[f"system_{i}"] = given.where(given != "", "other")
     # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
         _add_size(table, i, building)
-        _add_period(table, i, building, systems[f"system_{i}"].to_numpy(dtype=str))
-        _add_strength(table, i)
+        system = systems[f"system_{i}"].to_numpy(dtype=str)
+        _add_period(table, i, building, system)
+        _add_strength(table, i, building, system)
+    _add_period_correlation(table, *systems.values())
     _add_contact(table, building)
     _add_gap(table, building)
     for i in (1, 2):
@@ -165,15 +185,42 @@ def _add_period(
         table.columns[f"{name}_log_std_{i}"] = table.given(f"{name}_log_std_{i}", spread)
 
 
-def _add_strength(table: _Columns, i: int) -> None:
-    """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
+def _add_period_correlation(table: _Columns, *systems: pd.Series) -> None:
+    """Add the correlation of the residuals of both periods; 0 where one of them is given."""
+    storeys = (table.columns[f"storeys_{i}"] for i in (1, 2))
+    both_derived = table.derived["period_1"] & table.derived["period_2"]
+    likeness = np.where(both_derived, period_correlation(*systems, *storeys), 0.0)
+    table.fill("period_correlation", likeness)
+    table.derived["period_correlation"] &= both_derived
+
+
+def _add_strength(
+    table: _Columns, i: int, building: config.Building, system: NDArray[np.str_]
+) -> None:
+    """
+    Add yield displacement, m, and hardening of building i; infinite and 0 where unknown.
+
+    The yield displacement of HAZUS is beside them, by which a building without one is judged.
+    """
+    period, storeys, name = (
+        table.columns[f"period_{i}"],
+        table.storeys(i),
+        f"yield_displacement_{i}",
+    )
+    assumed = hazus_yield_displacement(period, system, storeys, building.code_level)
+    table.columns[f"hazus_yield_{i}"] = assumed
     # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
-    share = np.nan_to_num(effective_mass_ratio(table.storeys(i)), nan=1.0)
+    share = np.nan_to_num(effective_mass_ratio(storeys), nan=1.0)
     coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
-    radius = (table.columns[f"period_{i}"] / 2 / np.pi) ** 2
-    strength = table.fill(f"yield_displacement_{i}", coefficient * radius)
-    table.columns[f"yield_displacement_{i}"] = np.where(np.isnan(strength), np.inf, strength)
-    table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", 0.0)
+    strength = table.given(name, coefficient * (period / 2 / np.pi) ** 2)
+    is_assumed = np.isnan(strength) & ~np.isnan(assumed) & (building.strength == "hazus")
+    strength = table.fill(name, np.where(is_assumed, assumed, strength))
+    table.columns[name] = np.where(np.isnan(strength), np.inf, strength)
+    # Deviation and hardening of an assumed strength
+    hardening = np.where(is_assumed, hazus_hardening(system, storeys), 0.0)
+    table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", hardening)
+    spread = np.where(is_assumed, CAPACITY_LOG_STD, 0.0)
+    table.columns[f"yield_log_std_{i}"] = table.given(f"yield_log_std_{i}", spread)
 
 
 def _add_contact(table: _Columns, building: config.Building) -> None:
@@ -195,6 +242,9 @@ def _add_contact(table: _Columns, building: config.Building) -> None:
     offset = np.where(np.isnan(sizes).any(axis=0), np.nan, floor_offset(*sizes))
     table.fill("floor_offset", offset)
     table.fill("restitution", building.restitution)
+    # A given restitution is that of an instant impact
+    deviation = np.where(table.derived["restitution"], CONTACT_LOG_STD, 0.0)
+    table.columns["contact_log_std"] = table.given("contact_log_std", deviation)
 
 
 def _add_gap(table: _Columns, building: config.Building) -> None:

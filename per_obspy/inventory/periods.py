@@ -4,7 +4,8 @@ First natural periods from height and structural system, for buildings without a
 A code's period formula is calibrated as a *lower bound*, because a short period gives a large
 design force. For pounding that is the unsafe side: displacements grow with the period. The
 functions here return medians (best fits) where the literature has them, and each value carries a
-logarithmic standard deviation, ``period_log_std``.
+logarithmic standard deviation, ``period_log_std``. Buildings that are alike miss their formula
+alike: ``period_correlation``.
 """
 
 from typing import Any
@@ -32,6 +33,16 @@ _COEFFICIENTS = {
     "other": (1.0, 0.0488, 0.75, 0.050, 0.4),
 }
 EC8_HEIGHT = 40.0
+
+#: Correlation of ln(period / formula) of two neighbours: of one system and number of storeys, of
+#: one system, and of others. Reasoned, as no survey of neighbours was found: the deviations above
+#: are those of whole stocks, of many builders, codes, infills and soils, of which neighbours share
+#: most. With 0.85 the periods of two alike differ by a log-standard deviation of 0.55 of one
+#: period's. Even nine tower blocks of one design at one site have different frequencies (Ellis &
+#: Littler, "Dynamic response of nine similar tower blocks"; only the summary was read).
+ALIKE, ONE_SYSTEM, OTHERS = 0.85, 0.5, 0.2
+#: Chance that two neighbours have one system where one is ``other``: masonry or unknown. Reasoned.
+ONE_SYSTEM_CHANCE = 0.5
 
 
 def _coefficients(system: ArrayLike) -> NDArray[Any]:
@@ -136,3 +147,34 @@ def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatA
     """
     *_, exponent, _, scatter = _coefficients(system)
     return np.asarray(np.hypot(scatter, exponent * np.asarray(height_log_std)))
+
+
+def period_correlation(
+    system_1: ArrayLike, system_2: ArrayLike, storeys_1: ArrayLike, storeys_2: ArrayLike
+) -> FloatArray:
+    """
+    Return the correlation of the residuals ln(period / formula) of two neighbours.
+
+    Parameters
+    ----------
+    system_1, system_2 : array_like of str
+        One of ``SYSTEMS`` each.
+    storeys_1, storeys_2 : array_like
+        Numbers of storeys.
+
+    Returns
+    -------
+    correlation : ndarray
+        From 0 to 1: ``ALIKE``, ``ONE_SYSTEM`` or ``OTHERS``, or between them where a system is
+        unknown.
+
+    Examples
+    --------
+    >>> period_correlation("concrete_mrf", ["concrete_mrf", "steel_mrf", "other"], 9, 9)
+    array([0.85 , 0.2  , 0.525])
+    """
+    first, second = np.asarray(system_1, dtype=str), np.asarray(system_2, dtype=str)
+    is_unknown = (first == "other") | (second == "other")
+    chance = np.where(is_unknown, ONE_SYSTEM_CHANCE, first == second)
+    of_one_system = np.where(np.equal(storeys_1, storeys_2), ALIKE, ONE_SYSTEM)
+    return np.asarray(OTHERS + chance * (of_one_system - OTHERS))

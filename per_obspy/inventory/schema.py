@@ -105,8 +105,14 @@ _PAIR = (
     Column("same_property", "str", "",
            "whether both buildings are within one property; code rules take the larger gap where "
            "it is empty", choices=ONE_PROPERTY),
+    Column("period_correlation", "float64", "1",
+           "correlation of the uncertainties of both periods; alike neighbours miss a period "
+           "formula alike", low=0.0, high=1.0, hint="a fraction is expected, not per cent"),
     Column("restitution", "float64", "1", "coefficient of restitution of impact",
            low=0.0, high=1.0, hint="a fraction is expected, not per cent"),
+    Column("contact_log_std", "float64", "1",
+           "log-standard deviation of impact velocities by the contact law and the restitution",
+           low=0.0, high=2.0),
     Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground",
            low=30.0, high=4000.0, hint="in cm/s?", hint_below="in km/s?"),
     Column("site_class", "str", "",
@@ -153,6 +159,8 @@ _BUILDING = (
     Column("yield_displacement", "float64", "m",
            "yield displacement of the equivalent oscillator; infinite if it stays "
            "linear", low=TINY),
+    Column("yield_log_std", "float64", "1",
+           "logarithmic standard deviation of the yield displacement", low=0.0, high=2.0),
     Column("yield_coefficient", "float64", "1",
            "base shear at yield / total weight of the building; the oscillator yields at that over "
            "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",
@@ -208,6 +216,12 @@ COMPLETED: dict[str, Column] = {
         *(
             Column(f"contact_mass_{i}", "float64", "kg",
                    f"building {i}: generalised first-mode mass at contact height")
+            for i in (1, 2)
+        ),
+        *(
+            Column(f"hazus_yield_{i}", "float64", "m",
+                   f"building {i}: yield displacement of the oscillator by HAZUS, for its system, "
+                   "storeys and the assumed code level; empty where the system is unknown")
             for i in (1, 2)
         ),
         Column(

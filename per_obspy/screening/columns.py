@@ -230,6 +230,12 @@ RESULTS: dict[str, Column] = {
             "1",
             "estimated displacement / yield displacement; the building stays elastic up to 1",
         ),
+        *_per_building(
+            "elastic_ratio",
+            "1",
+            "elastic displacement / yield displacement by HAZUS; above 1 the building would yield, "
+            "which is not modelled; empty where its system is unknown or a yield value is given",
+        ),
         _number("missing_gap", "m", "demand minus gap; 0 where the gap is enough"),
         _number(
             "supplemental_damping",
@@ -257,7 +263,8 @@ ORDER = (
     "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2",
     "per_1", "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per",
     "critical_gap_record", "critical_gap_linearized", "correlation_linearized", "ductility_1",
-    "ductility_2", "critical_gap_sd", "srss_gap", "absolute_gap", "demand_estimated",
+    "ductility_2", "elastic_ratio_1", "elastic_ratio_2", "critical_gap_sd", "srss_gap",
+    "absolute_gap", "demand_estimated",
     "estimate_rule", "demand_exact", "estimate_over_exact", "demand_two_sided", "missing_gap",
     "supplemental_damping", "bumper_restitution", "ln_per_ratio_1", "ln_per_ratio_2",
     "ln_per_std_1", "ln_per_std_2", "contact_mass_1", "contact_mass_2", "restitution",
@@ -337,6 +344,10 @@ FLAGS: dict[str, str] = {
     ),
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"
+    ),
+    "beyond_elastic": (
+        "a building would yield, which is not modelled: its elastic displacement is elastic_ratio "
+        "times the yield displacement of HAZUS for its system, storeys and assumed code level"
     ),
     "outside_usable_periods": (
         "a building's period is outside the usable periods of the station's record"

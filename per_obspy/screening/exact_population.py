@@ -25,9 +25,11 @@ histories.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
+from per_obspy.kernels.pairs.node_outcomes import QUANTILE
 from per_obspy.screening.exact import (
     can_yield,
     exact_approach,
@@ -38,6 +40,7 @@ from per_obspy.screening.population import (
     COLUMNS,
     NODES,
     SAMPLES,
+    STRENGTH,
     RelativeMotion,
     Uncertain,
     UncertainMotion,
@@ -106,7 +109,7 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 
 #: Columns of a pair from which its demand at the site and its history follow.
 PAIR = (
-    *("gap", "restitution", "azimuth", "azimuth_used", "distance"),
+    *("gap", "restitution", "contact_log_std", "azimuth", "azimuth_used", "distance"),
     *("ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2"),
 )
 
@@ -116,7 +119,8 @@ BUILDING = ("participation", "yield_displacement", "hardening", "per", "contact_
 #: Columns of one building from which a population follows.
 NEEDED_OF_BUILDING = (
     *BUILDING,
-    *("period", "damping", "period_log_std", "damping_log_std", "amplification_exact"),
+    *("period", "damping", "period_log_std", "damping_log_std", "yield_log_std"),
+    "amplification_exact",
     *("equivalent_period", "equivalent_damping", "equivalent_per"),
 )
 
@@ -124,6 +128,7 @@ NEEDED_OF_BUILDING = (
 NEEDED = (
     *PAIR,
     *("gap_std", "assumed_gap", "absolute_gap", "demand_rule", "demand_exact"),
+    "period_correlation",
     *("correlation", "correlation_record", "correlation_linearized", "impact_velocity_exact"),
     *(f"{name}_{i}" for name in NEEDED_OF_BUILDING for i in (1, 2)),
 )
@@ -226,14 +231,15 @@ def _of_certain_buildings(block: _Block) -> Columns:
     table, site = block.table, block.site
     moving, factor = _at_the_medians(block)
     result = population(Uncertain(moving, site.log_std, factor), table, NODES)
-    # no uncertainty: the exact history itself
+    # no uncertainty but of the contact law: the exact history itself
     at_record = (site.log_std == 0.0) & (site.ln_ratio == 0.0) & (site.weight == 1.0)
     certain = at_record & (gap_dispersion(table) == 0.0)
     velocity = np.nan_to_num(values(table, "impact_velocity_exact"))
     amplified = np.fmax(*both(table, "amplification_exact"))
+    contact_std = values(table, "contact_log_std")
     history = {
         "expected_impact_velocity": velocity,
-        "impact_velocity_84": velocity,
+        "impact_velocity_84": velocity * np.exp(contact_std * (ndtri(QUANTILE) - contact_std / 2)),
         "expected_amplification": np.where(velocity > 0.0, np.fmax(amplified, 1.0), 1.0),
     }
     return result | {name: np.where(certain, history[name], result[name]) for name in history}
@@ -365,6 +371,9 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
         period = period_at_nodes(values(table, f"period_{i}"), table, i, nodes)
         damping = damping_at_nodes(values(table, f"damping_{i}"), table, i, nodes)
         sample[f"period_{i}"], sample[f"damping_{i}"] = period.ravel(), damping.ravel()
+        # an infinite yield displacement stays so
+        deviation = np.outer(values(table, f"yield_log_std_{i}"), nodes[:, STRENGTH[i - 1]])
+        sample[f"yield_displacement_{i}"] *= np.exp(deviation).ravel()
     return sample
 
 

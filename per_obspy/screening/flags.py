@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import xarray as xr
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
 from per_obspy.inventory.table_columns import joined_names
@@ -33,6 +34,20 @@ def outlines_are_learned(pairs: Table) -> BoolArray:
     return np.asarray(pairs["gap_std_source"], dtype=object) == "learned"
 
 
+def elastic_ratios(table: Table) -> dict[str, FloatArray]:
+    """
+    Return the elastic displacement of both buildings over their yield displacement by HAZUS.
+
+    NaN where the pair table gives a yield value, or the system is unknown.
+    """
+    ratios = {}
+    for i in (1, 2):
+        ratio = values(table, f"sd_{i}") / values(table, f"hazus_yield_{i}")
+        is_linear = np.isinf(values(table, f"yield_displacement_{i}"))
+        ratios[f"elastic_ratio_{i}"] = np.where(is_linear, ratio, np.nan)
+    return ratios
+
+
 def joined_flags(raised: Mapping[str, BoolArray]) -> TextArray:
     """Join the names of the flags of each row, in the order of ``FLAGS``, with blanks."""
     return joined_names({name: raised[name] for name in FLAGS if name in raised})
@@ -55,6 +70,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "doubtful_cell": has_note,
         "touching": gap == 0.0,
         "learned_outlines": outlines_are_learned(table),
+        "beyond_elastic": np.fmax(*both(table, "elastic_ratio")) > 1.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": period_is_derived(table),

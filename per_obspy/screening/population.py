@@ -12,7 +12,8 @@ A node is as uncertain as everything but the buildings is, or as the spread of t
 root of their number where that is more. The spread is the smaller one of the standard deviation and
 that of a normal variable of the same quartiles: few nodes far off do not count.
 
-Periods and dampings are lognormal, independent in both buildings. One node serves all pairs
+Periods and dampings are lognormal. Those of both buildings are independent, but for periods with a
+``period_correlation``: alike neighbours miss a period formula alike. One node serves all pairs
 alike, so that a row does not depend on the other pairs.
 
 Two oscillators whose relative displacement would reach D and whose relative velocity V hit at a gap
@@ -64,13 +65,13 @@ from per_obspy.screening.values import (
 )
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
-#: given buildings, and of ln gap: the second 128 Sobol points, which lie in the middle of their
-#: strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at
-#: some nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(6, scramble=False).fast_forward(128).random(128))
+#: given buildings, of ln gap, of ln impact velocity by the contact, and of ln yield displacement of
+#: both buildings: the second 128 Sobol points, which lie in the middle of their strata. On a grid,
+#: or at the first 128, equal buildings would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(9, scramble=False).fast_forward(128).random(128))
 
-#: Columns of ``NODES``: both buildings, demand, gap.
-BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
+#: Columns of ``NODES``: both buildings, demand, gap, contact, strength of building 1 and 2.
+BUILDINGS, DEMAND, GAP, CONTACT, STRENGTH = slice(0, 4), 4, 5, 6, (7, 8)
 
 #: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
 #: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
@@ -85,8 +86,12 @@ LARGEST_DAMPING = 0.99
 
 def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
     """Return the lognormal period of building i at the nodes, (n_pairs, n_nodes), s."""
-    deviation = values(table, f"period_log_std_{i}")
-    period: FloatArray = median[:, None] * np.exp(np.outer(deviation, nodes[:, 2 * i - 2]))
+    deviate = nodes[None, :, 0]
+    if i == 2:
+        shared = values(table, "period_correlation")[:, None]
+        deviate = shared * deviate + np.sqrt(1.0 - shared**2) * nodes[:, 2]
+    deviation = values(table, f"period_log_std_{i}")[:, None]
+    period: FloatArray = median[:, None] * np.exp(deviation * deviate)
     return period
 
 
@@ -99,10 +104,9 @@ def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray
 
 
 def building_is_uncertain(pairs: Table) -> BoolArray:
-    """Return a mask of pairs in which a period or damping has a log-standard deviation."""
-    period = np.maximum(*both(pairs, "period_log_std"))
-    damping = np.maximum(*both(pairs, "damping_log_std"))
-    return np.asarray((period > 0) | (damping > 0))
+    """Return a mask of pairs in which period, damping or strength has a log-standard deviation."""
+    deviations = ("period_log_std", "damping_log_std", "yield_log_std")
+    return np.any([np.maximum(*both(pairs, name)) > 0 for name in deviations], axis=0)
 
 
 def gap_dispersion(pairs: Table) -> FloatArray:
@@ -242,9 +246,10 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
             *(median_gap(pairs), gap_dispersion(pairs)),
             *(uncertain.log_std, uncertain.velocity_factor),
             *_received(pairs),
+            values(pairs, "contact_log_std"),
         ]
     )
-    deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP]].T)
+    deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP, CONTACT]].T)
     # one node of certain buildings is all nodes
     every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
     # always writable: a read-only array would compile the kernel a second time
@@ -370,9 +375,9 @@ def estimated_motion(
     )
     relative = np.empty((MOTION_ROWS, motion.row.size, len(nodes)))
     deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
-    estimate_motion(
-        *spectra, motion.row, np.stack([*first, *second]), np.atleast_1d(shift), deviates, relative
-    )
+    both_buildings = np.stack([*first, *second])
+    correlations = np.stack([np.atleast_1d(shift), values(pairs, "period_correlation")])
+    estimate_motion(*spectra, motion.row, both_buildings, correlations, deviates, relative)
     return RelativeMotion(*relative)
 
 

@@ -8,7 +8,7 @@ from per_obspy.config import Screening, States
 from per_obspy.config.screening import EVERY_STATE as EVERY_STATE
 from per_obspy.config.screening import STATES as STATES
 from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
-from per_obspy.screening.flags import outlines_are_learned
+from per_obspy.screening.flags import elastic_ratios, outlines_are_learned
 from per_obspy.screening.values import Columns, IndexArray, TextArray, values
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
@@ -77,10 +77,13 @@ def risk_class(velocity: FloatArray, classes: dict[str, float]) -> TextArray:
 
 def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     """
-    Return gap over demand, state and risk class of rows; the population alone decides the latter.
+    Return gap over demand, elastic over yield displacements, state and risk class of rows.
 
-    The ratio is 0 for touching pairs and NaN (an empty cell) where the demand is 0. Pairs of
-    outlines that were learned from images are ``unlikely`` where others are a ``no``.
+    Return gap over demand, elastic over yield displacements, state and risk class of rows.
+
+    The population alone decides the last two. The first ratio is 0 for touching pairs and NaN (an
+    empty cell) where the demand is 0. Pairs of outlines that were learned from images are
+    ``unlikely`` where others are a ``no``.
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     nothing = np.full(demand.shape, np.nan)
@@ -88,6 +91,7 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     state[outlines_are_learned(table) & (state == STATES[-1])] = STATES[-2]
     return {
         "demand_ratio": np.divide(gap, demand, out=nothing, where=demand > 0),
+        **elastic_ratios(table),
         "state": state,
         "risk_class": risk_class(values(table, "expected_impact_velocity"), screening.classes),
     }

@@ -25,7 +25,14 @@ from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
-LOGNORMAL = ("period_1", "period_2", "damping_1", "damping_2")
+LOGNORMAL = (
+    *("period_1", "period_2", "damping_1", "damping_2"),
+    *("yield_displacement_1", "yield_displacement_2"),
+)
+
+#: Standard deviation of Fisher's z of a derived correlation of both periods. Reasoned: one step of
+#: likeness, from 0.5 down to 0 and up to 0.82.
+CORRELATION_STD = 0.6
 
 #: Share of outcomes below the lower value; as many lie above the upper one.
 TAIL = 0.16
@@ -135,7 +142,7 @@ def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
     derived = rows["derived"].str.split()
     columns: dict[str, pd.Series] = {}
     # An empty period keeps its deviation; masses and heights have none of their own
-    for name in (*LOGNORMAL, "gap"):
+    for name in (*LOGNORMAL, "gap", "period_correlation"):
         is_derived = derived.map(lambda names, name=name: name in names)
         columns[name] = rows[name].mask(is_derived, np.nan)
     return rows.assign(**columns)
@@ -143,20 +150,31 @@ def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFrame:
     """Return a pair table in which one input is certain."""
-    deviation = "gap_std" if name == "gap" else name.replace("_", "_log_std_")
-    certain = np.zeros(len(given))
-    return given.assign(**{name: value, deviation: certain})
+    changed = given.assign(**{name: value})
+    if name == "period_correlation":
+        return changed
+    return changed.assign(**{"gap_std" if name == "gap" else _deviation(name): 0.0})
+
+
+def _deviation(name: str) -> str:
+    """Return the column of the log-standard deviation of an input of a building."""
+    return f"{name.split('_')[0]}_log_std_{name[-1]}"
 
 
 def _ends(rows: pd.DataFrame) -> dict[str, Ends]:
     """Return the lower and the upper value of each input, and the rows in which it is uncertain."""
     ends = {}
     for name in LOGNORMAL:
-        deviation = np.nan_to_num(values(rows, name.replace("_", "_log_std_")))
+        deviation = np.nan_to_num(values(rows, _deviation(name)))
         median, spread = values(rows, name), np.exp(deviation)
         # A damping stays below the critical one, as at the nodes
         largest = np.maximum(median, LARGEST_DAMPING) if "damping" in name else np.inf
         ends[name] = median / spread, np.minimum(median * spread, largest), deviation > 0.0
+    # a derived correlation is below 1
+    is_derived = rows["derived"].str.contains("period_correlation").to_numpy(bool)
+    shared = np.arctanh(np.where(is_derived, values(rows, "period_correlation"), 0.0))
+    low, high = np.tanh(shared - CORRELATION_STD), np.tanh(shared + CORRELATION_STD)
+    ends["period_correlation"] = np.maximum(low, 0.0), high, is_derived
     return ends | {"gap": _gap_ends(rows)}
 
 

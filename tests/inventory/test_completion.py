@@ -46,7 +46,7 @@ def test_what_is_given_stays_and_is_not_marked():
         given |= {f"storeys_{i}": 4.0, f"system_{i}": "steel_mrf"}
     # every quantity of the pair
     given |= {"contact_height": 11.0, "floor_offset": 0.2, "restitution": 0.4}
-    given |= {"gap_std": 0.01, "azimuth": 30.0}
+    given |= {"gap_std": 0.01, "azimuth": 30.0, "period_correlation": 0.3}
     row = _completed(**given)
     assert row["derived"] == ""
     assert {name: row[name] for name in given} == given
@@ -55,7 +55,8 @@ def test_what_is_given_stays_and_is_not_marked():
 def test_a_bare_row_is_marked_where_it_was_filled():
     row = _completed(**SIZES)
     both = ("system", "storeys", "period", "damping", "participation", "mass")
-    expected = {f"{name}_{i}" for name in both for i in (1, 2)} | {"contact_height", "restitution"}
+    expected = {f"{name}_{i}" for name in both for i in (1, 2)}
+    expected |= {"contact_height", "restitution", "period_correlation"}
     assert set(row["derived"].split()) == expected
     assert (row["storeys_1"], row["storeys_2"]) == (4.0, 3.0)
     assert row["contact_height"] == 9.0
@@ -70,12 +71,48 @@ def test_a_bare_row_is_marked_where_it_was_filled():
     assert np.isnan(row["azimuth"])
 
 
+def test_periods_of_alike_neighbours_are_correlated():
+    rows = [
+        {"system_1": "concrete_mrf", "system_2": "concrete_mrf"},
+        {"system_1": "concrete_mrf", "system_2": "concrete_mrf", "storeys_2": 9.0},
+        {"system_1": "concrete_mrf", "system_2": "steel_mrf"},
+        {"system_1": "concrete_mrf", "period_1": 0.5},
+        {"system_1": "concrete_mrf", "period_correlation": 0.7},
+        {},
+    ]
+    alike = {"storeys_1": 4.0, "storeys_2": 4.0, "system_1": "", "system_2": ""}
+    table = pd.DataFrame([PLACE | alike | row for row in rows])
+    complete = completed_pairs(table, Building())
+    # the same system and storeys, one system, two; one period given; given; unknown systems
+    assert_allclose(complete["period_correlation"], [0.85, 0.5, 0.2, 0.0, 0.7, 0.525], rtol=1e-14)
+    derived = ["period_correlation" in text.split() for text in complete["derived"]]
+    assert derived == [True, True, True, False, False, True]
+
+
+def test_hazus_gives_a_strength_to_known_systems_without_one():
+    rows = [{"system_1": "concrete_mrf"}, {"system_1": ""}, {"yield_coefficient_1": 0.2}]
+    given = {"system_1": "concrete_mrf", "system_2": "", "storeys_1": 5.0, "period_1": 0.75}
+    table = pd.DataFrame([PLACE | SIZES | given | row for row in rows])
+    linear = completed_pairs(table, Building())
+    complete = completed_pairs(table, Building(strength="hazus"))
+    # HAZUS-MH, C1M, moderate code: 0.58 inches at 0.75 s, two digits each, the period squared
+    assert linear["yield_displacement_1"].tolist()[:2] == [np.inf, np.inf]
+    assert_allclose(complete["yield_displacement_1"][0], 0.58 * 0.0254, rtol=0.02)
+    assert_allclose(complete["hardening_1"], [0.18, 0.0, 0.0])
+    assert complete["yield_log_std_1"].tolist() == [0.4, 0.0, 0.0]
+    marked = ["yield_displacement_1" in text.split() for text in complete["derived"]]
+    assert marked == [True, False, True]
+    # a given strength stays, an unknown system is linear
+    assert complete["yield_displacement_1"][1] == complete["yield_displacement_2"][0] == np.inf
+    assert complete["yield_displacement_1"][2] == linear["yield_displacement_1"][2]
+
+
 def test_marks_belong_to_their_row():
     # would catch marks of one row written into another
     table = pd.DataFrame([PLACE | SIZES, PLACE | SIZES | {"period_1": 0.5}, PLACE | SIZES])
     derived = completed_pairs(table, Building())["derived"]
     assert derived[0] == derived[2]
-    assert set(derived[0].split()) - set(derived[1].split()) == {"period_1"}
+    assert set(derived[0].split()) - set(derived[1].split()) == {"period_1", "period_correlation"}
 
 
 def test_heights_and_storeys_from_each_other():

@@ -1,6 +1,7 @@
 """Population by estimates: limits, and Monte Carlo estimates that share only the stored spectra."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from screening_samples import make_pairs, make_station
 
@@ -89,13 +90,14 @@ def test_equal_derived_buildings_that_touch_always_pound(station):
     assert _row(station, **derived, gap=1e-4)["probability"] > 0.995
 
 
-def _drawn_oscillators(station, row, i, count, random):
+def _drawn_oscillators(station, row, i, deviates, random):
     """Return drawn periods, dampings and radii of building i, by the stored spectra."""
+    count = deviates.size
     spectra = station_motion(station).per
     azimuth = np.zeros(count, dtype=int)  # of the only horizontal
     # both are lognormal
     median_period, median_damping = np.log([row[f"period_{i}"]]), np.log([0.05])
-    period = median_period + random.normal(size=count) * row[f"period_log_std_{i}"]
+    period = median_period + deviates * row[f"period_log_std_{i}"]
     damping = median_damping + random.normal(size=count) * 0.3
     # PER of the row, changed as the stored spectrum is
     median = stored_log(spectra, azimuth[:1], median_period, median_damping)
@@ -104,16 +106,20 @@ def _drawn_oscillators(station, row, i, count, random):
     return np.exp(period), np.exp(damping), radius
 
 
-def test_equal_derived_buildings_against_monte_carlo():
+@pytest.mark.parametrize("shared", [0.0, 0.525, 0.85])
+def test_equal_derived_buildings_against_monte_carlo(shared):
     # would catch: both periods resampled together, which keeps equal buildings in step and the
     # probability at 0
     derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
     station = make_station(channels=("HNN",))  # one horizontal: the record drives no nodes
     gap = 0.6 * _row(station, **derived, gap=1.0)["srss_gap"]
-    row = _row(station, **derived, gap=gap)
+    row = _row(station, **derived, gap=gap, period_correlation=shared)
     random, count = np.random.default_rng(11), 40_000
-    period_1, damping_1, radius_1 = _drawn_oscillators(station, row, 1, count, random)
-    period_2, damping_2, radius_2 = _drawn_oscillators(station, row, 2, count, random)
+    # a bivariate normal distribution of both ln periods
+    covariance = [[1.0, shared], [shared, 1.0]]
+    first, second = random.multivariate_normal([0.0, 0.0], covariance, count).T
+    period_1, damping_1, radius_1 = _drawn_oscillators(station, row, 1, first, random)
+    period_2, damping_2, radius_2 = _drawn_oscillators(station, row, 2, second, random)
     correlation = per_obspy.ddc_correlation(period_1, damping_1, period_2, damping_2)
     # equal medians, whose ratio has a log-standard deviation of that of both
     apart = np.exp(np.hypot(row["period_log_std_1"], row["period_log_std_2"]))

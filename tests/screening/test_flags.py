@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_array_equal
 
 from per_obspy.config import Screening
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.flags import (
+    elastic_ratios,
     joined_flags,
     period_is_derived,
     raised_by_pairs,
@@ -27,6 +29,8 @@ PLAIN = {
     "per_2": [0.2, 0.2],
     "sd_1": [0.1, 0.1],
     "sd_2": [0.2, 0.2],
+    "elastic_ratio_1": [np.nan, np.nan],
+    "elastic_ratio_2": [1.0, 1.0],
     "other_site_class": [False, False],
     "linearized_converged": [True, True],
     "supplemental_damping": [0.0, 0.0],
@@ -72,10 +76,24 @@ def _raised(flags):
         ({"derived": "system_1"}, {"derived_inputs"}),
         ({"derived": "mass_2 period_2"}, {"derived_inputs", "derived_period"}),
         ({"floors_misaligned": True}, {"floor_to_column"}),
+        # either building counts, whether the strength of the other is known or not
+        ({"elastic_ratio_1": 1.01}, {"beyond_elastic"}),
+        ({"elastic_ratio_2": 1.01}, {"beyond_elastic"}),
     ],
 )
 def test_flags_of_pairs(changes, flags):
     assert _raised(raised_by_pairs(_table(**changes))) == [set(), flags]
+
+
+def test_only_a_linear_building_of_known_strength_goes_beyond_it():
+    pairs = {
+        "sd_1": [0.06, 0.06, 0.06],
+        "hazus_yield_1": [0.03, 0.03, np.nan],
+        "yield_displacement_1": [np.inf, 0.02, np.inf],
+    }
+    pairs |= {name.replace("_1", "_2"): column for name, column in pairs.items()}
+    # twice its yield displacement; modelled; of unknown system
+    assert_array_equal(elastic_ratios(pairs)["elastic_ratio_1"], [2.0, np.nan, np.nan])
 
 
 @pytest.mark.parametrize(

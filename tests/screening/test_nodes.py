@@ -19,13 +19,16 @@ PAIRS = {
     "damping_log_std_1": np.array([5.0, 0.0]),
     "period_log_std_2": np.array([0.0, 0.0]),
     "damping_log_std_2": np.array([0.0, 0.0]),
+    "yield_log_std_1": np.array([0.0, 0.0]),
+    "yield_log_std_2": np.array([0.0, 0.0]),
+    "period_correlation": np.array([0.0, 0.0]),
 }
 
 
 def test_nodes_are_those_of_independent_standard_normal_variables():
     # 128 quasi-random nodes: mean, variance and covariance within a few hundredths
     assert_allclose(NODES.mean(axis=0), 0, atol=0.03)
-    assert_allclose(np.cov(NODES.T), np.eye(6), atol=0.1)
+    assert_allclose(np.cov(NODES.T), np.eye(9), atol=0.1)
 
 
 def test_the_first_nodes_have_the_moments_too():
@@ -38,6 +41,21 @@ def test_periods_are_lognormal_and_certain_ones_stay():
     period = period_at_nodes(np.array([2.0, 1.0]), PAIRS, 1, NODES)
     assert_allclose(np.log(period[0]), np.log(2.0) + 0.3 * NODES[:, 0], rtol=1e-12)
     assert_array_equal(period[1], np.ones(len(NODES)))
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.5, 0.85, 1.0])
+def test_periods_of_alike_neighbours_are_correlated(shared):
+    pairs = PAIRS | {"period_log_std_2": np.full(2, 0.4), "period_correlation": np.full(2, shared)}
+    first, second = (period_at_nodes(np.ones(2), pairs, i, NODES)[0] for i in (1, 2))
+    # 128 quasi-random nodes: correlation and deviation within some hundredths
+    assert_allclose(np.corrcoef(np.log(first), np.log(second))[0, 1], shared, atol=0.03)
+    assert_allclose(np.log(second).std(), 0.4, atol=0.02)
+
+
+def test_without_correlation_the_periods_are_those_of_independent_nodes():
+    pairs = PAIRS | {"period_log_std_2": np.full(2, 0.4)}
+    period = period_at_nodes(np.array([2.0, 1.0]), pairs, 2, NODES)
+    assert_array_equal(period, np.outer([2.0, 1.0], np.exp(0.4 * NODES[:, 2])))
 
 
 def test_no_damping_is_critical():

@@ -11,7 +11,7 @@ from per_obspy.screening.population import COLUMNS
 
 #: Two buildings at the station itself, where the motion is the record's.
 AT_STATION = {"longitude_1": 19.9999, "longitude_2": 20.0001}
-GIVEN = {"damping_1": 0.05, "damping_2": 0.05, **AT_STATION}
+GIVEN = {"damping_1": 0.05, "damping_2": 0.05, "restitution": 0.65, **AT_STATION}
 EQUAL = {
     "period_1": 1.0, "period_2": 1.0, "participation_1": 1.0, "participation_2": 1.0, "mass_1": 1e6,
     "mass_2": 1e6,
@@ -38,6 +38,22 @@ def test_without_doubt_the_population_is_the_exact_history(station):
         assert_allclose(table[name], exact, rtol=0)
     amplified = table[["amplification_exact_1", "amplification_exact_2"]].max(axis=1).clip(lower=1)
     assert_allclose(table["expected_amplification"], amplified, rtol=0)
+
+
+@pytest.mark.parametrize("doubt", [{}, DOUBT, {"gap_std": 0.01}])
+def test_a_doubt_about_the_contact_moves_only_the_upper_velocity(station, doubt):
+    # a restitution that the table does not give: the mean velocity, and with it the rank, stays
+    pairs = [{**GIVEN, **doubt, "gap": 0.02, "restitution": e} for e in (0.65, np.nan)]
+    given, assumed = (row for _, row in _table(station, pairs).iterrows())
+    assert (given["contact_log_std"], assumed["contact_log_std"]) == (0.0, 0.1)
+    for name in ("probability", "expected_impact_velocity", "expected_amplification"):
+        assert given[name] == assumed[name]
+    # exp(0.1) of a normal variable at one deviation, less of one that is doubtful besides
+    ratio = assumed["impact_velocity_84"] / given["impact_velocity_84"]
+    if doubt:
+        assert 0.98 < ratio < 1.12
+    else:
+        assert_allclose(ratio, np.exp(0.1 * 0.9945 - 0.005), rtol=1e-4)
 
 
 @pytest.mark.parametrize("pair", [GIVEN, {**GIVEN, **DOUBT}, DERIVED])

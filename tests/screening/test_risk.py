@@ -102,7 +102,7 @@ def test_derived_periods_are_never_a_plain_no(station):
     table = _table(station, unknown)
     assert table.loc["P0", "demand_rule"] == "srss"
     assert table.loc["P0", "demand"] == table.loc["P0", "srss_gap"] > 0
-    assert table.loc["P0", "state"] in {"yes", "possible"}
+    assert table.loc["P0", "state"] in {"yes", "likely", "possible", "unlikely"}
     assert "derived_period" in table.loc["P0", "flags"].split()
 
 

@@ -44,7 +44,7 @@ def found(table, ground):
 
 
 def test_only_what_is_uncertain_is_varied(found):
-    derived = ("period_1", "period_2", "damping_1", "damping_2")
+    derived = ("period_1", "period_2", "period_correlation", "damping_1", "damping_2")
     assert set(found) == {*(("P0", name) for name in derived), ("P1", "gap"), ("P3", "gap")}
 
 
@@ -66,6 +66,14 @@ def test_ends_are_a_standard_deviation_from_the_median(table, found):
     # A gap that is far from 0 in terms of its deviation is nearly normal: Phi(1) is 84.1 %
     gap = found["P1", "gap"]
     assert [gap.low, gap.high] == pytest.approx([0.2, 0.26], rel=0.01)
+
+
+def test_alike_neighbours_hit_each_other_less(table, found):
+    # two unknown systems of different storeys: halfway from 0.2 to 0.5
+    one = found["P0", "period_correlation"]
+    assert np.arctanh([one.low, one.high]) == pytest.approx([0.0, np.arctanh(0.35) + 0.6])
+    chance = table.set_index("pair_id").loc["P0", "probability"]
+    assert one.probability_low > chance > one.probability_high
 
 
 def test_a_wider_gap_is_less_likely_closed(found):

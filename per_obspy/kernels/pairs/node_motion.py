@@ -1,9 +1,10 @@
 """
 Estimated motion of pairs without contact at nodes of their buildings.
 
-Periods and dampings are lognormal. A radius changes as the stored spectrum does, which is bilinear
-in ln period and ln damping; eq. (15) and (16) give the relative motion. The nodes of a pair share
-one row, so that loops without branches over them become vectors.
+Periods and dampings are lognormal, the periods of both buildings correlated. A radius changes as
+the stored spectrum does, which is bilinear in ln period and ln damping; eq. (15) and (16) give the
+relative motion. The nodes of a pair share one row, so that loops without branches over them become
+vectors.
 """
 
 import math
@@ -27,7 +28,7 @@ SMALLEST = 1e-300
 
 
 @kernel
-def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviates, motion):
+def estimate_motion(periods, dampings, stored, rows, oscillators, correlations, deviates, motion):
     """
     Fill the motion of pairs at all nodes.
 
@@ -41,8 +42,8 @@ def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviat
         Row of the stored spectra of each pair.
     oscillators : (2 * OSCILLATOR_ROWS, n_pairs) ndarray
         See ``PERIOD`` and the following constants.
-    shifts : (n_pairs,) ndarray
-        Added to the correlation of eq. (16) in eq. (15).
+    correlations : (2, n_pairs) ndarray
+        What is added to the correlation of eq. (16) in eq. (15); correlation of both ln periods.
     deviates : (4, n_nodes) ndarray
         Standard normal: ln period and ln damping of building 1, then of 2.
     motion : (MOTION_ROWS, n_pairs, n_nodes) ndarray
@@ -51,13 +52,19 @@ def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviat
     count = deviates.shape[1]
     # of both buildings: ln period, damping, radius; 1 / period of building 1, root of T1 / T2
     work = np.empty((8, count))
+    normal = np.empty((2, count))
     integers = np.empty(count, np.int64)
     for pair in range(rows.size):
         spectrum = stored[rows[pair]]
         # Both buildings at all nodes
         for i in range(2):
             building = oscillators[i * OSCILLATOR_ROWS : (i + 1) * OSCILLATOR_ROWS, pair]
-            normal = deviates[2 * i : 2 * i + 2]
+            # building 2 shares a part of the deviate of building 1
+            shared = correlations[1, pair] if i == 1 else 0.0
+            own = math.sqrt(1.0 - shared * shared)
+            for node in range(count):
+                normal[0, node] = shared * deviates[0, node] + own * deviates[2 * i, node]
+                normal[1, node] = deviates[2 * i + 1, node]
             _oscillators(
                 building, normal, periods, dampings, spectrum, work[3 * i : 3 * i + 3], integers
             )
@@ -68,7 +75,7 @@ def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviat
         exponentials(work[6], integers)
         exponentials(work[7], integers)
         for node in range(count):
-            _relative_motion(work, node, shifts[pair], motion[:, pair])
+            _relative_motion(work, node, correlations[0, pair], motion[:, pair])
 
 
 @kernel

@@ -31,8 +31,8 @@ NEGLIGIBLE, TINY = 1e-3, float(np.finfo(np.float64).tiny)
 NORMAL_QUARTILES = 1.349
 #: Rows of what is known of a pair besides its motion: median gap (m), log-standard deviation of the
 #: gap and of the demand, factor of impact velocities, change of velocity of building 1 and of
-#: building 2 over the impact velocity.
-GAP, GAP_STD, DEMAND_STD, FACTOR, RECEIVED_1, RECEIVED_2, FACT_ROWS = range(7)
+#: building 2 over the impact velocity, log-standard deviation of impact velocities by the contact.
+GAP, GAP_STD, DEMAND_STD, FACTOR, RECEIVED_1, RECEIVED_2, CONTACT_STD, FACT_ROWS = range(8)
 #: Rows of the outcome: probability, expected impact velocity (m/s) and its quantile, expected
 #: amplification.
 OUTCOME_ROWS = 4
@@ -49,8 +49,8 @@ def fill_outcomes(motion, facts, deviates, out):
         See ``node_motion.py``.
     facts : (FACT_ROWS, n_pairs) ndarray
         See ``GAP`` and the following constants.
-    deviates : (2, n_nodes) ndarray
-        Standard normal: ln demand, ln gap.
+    deviates : (3, n_nodes) ndarray
+        Standard normal: ln demand, ln gap, ln velocity by the contact.
     out : (OUTCOME_ROWS, n_pairs) ndarray
         Receives the outcome.
     """
@@ -71,13 +71,18 @@ def fill_outcomes(motion, facts, deviates, out):
         for node in range(count):
             work[1, node] *= fact[GAP]
         _velocities(pair_motion, work, integers)
-        # Means over the nodes, and the quantile
+        # Means over the nodes, which the contact does not change
         velocity, amplified = 0.0, 0.0
         for node in range(count):
             work[2, node] *= fact[FACTOR]
             velocity += work[2, node]
             amplified += _amplification(pair_motion, work, node, fact)
+            work[3, node] = fact[CONTACT_STD] * (deviates[2, node] - 0.5 * fact[CONTACT_STD])
         out[1, pair] = velocity / count
+        # Quantile, with a factor of the contact whose mean is 1
+        exponentials(work[3], integers)
+        for node in range(count):
+            work[2, node] *= work[3, node]
         out[2, pair] = _quantile(work[2], QUANTILE)
         out[3, pair] = amplified / count
 

@@ -21,6 +21,8 @@ SPECTRA = LogSpectra(
     RANDOM.normal(-3.0, 1.0, (3, 3, 6)),
 )
 DEVIATES = RANDOM.normal(size=(4, NODES))
+#: Correlation of both ln periods of each pair.
+SHARED = np.array([0.0, 0.2, 0.85, 1.0, 0.5, 0.0])
 
 
 def _pairs():
@@ -48,7 +50,11 @@ def _definition(rows, oscillators, shifts, spectra):
     buildings = []
     for i in range(2):
         period, period_std, damping, damping_std, largest, radius = oscillators[6 * i : 6 * i + 6]
-        periods = period[:, None] * np.exp(np.outer(period_std, DEVIATES[2 * i]))
+        deviate = DEVIATES[0] + np.zeros((PAIRS, 1))
+        if i == 1:
+            own = np.sqrt(1.0 - SHARED**2)
+            deviate = np.outer(SHARED, DEVIATES[0]) + np.outer(own, DEVIATES[2])
+        periods = period[:, None] * np.exp(period_std[:, None] * deviate)
         dampings = damping[:, None] * np.exp(np.outer(damping_std, DEVIATES[2 * i + 1]))
         dampings = np.minimum(dampings, largest[:, None])
         stored = stored_log(spectra, rows[:, None], *log_period_and_damping(periods, dampings))
@@ -64,7 +70,8 @@ def _definition(rows, oscillators, shifts, spectra):
 
 def _found(rows, oscillators, shifts, spectra=SPECTRA):
     motion = np.empty((MOTION_ROWS, rows.size, NODES))
-    estimate_motion(*spectra, rows, oscillators, shifts, DEVIATES, motion)
+    correlations = np.stack([shifts, SHARED])
+    estimate_motion(*spectra, rows, oscillators, correlations, DEVIATES, motion)
     return motion
 
 

@@ -31,7 +31,8 @@ def _facts():
     gap_std = np.array([0.0, 0.0, 0.2, 0.0, 0.1, 0.0, 0.0, 0.0])
     demand_std = np.array([0.3, 0.0, 0.0, 0.4, 0.1, 0.01, 0.0, 0.2])
     factor, received = RANDOM.uniform(0.5, 2.0, PAIRS), RANDOM.uniform(0.1, 1.6, (2, PAIRS))
-    return np.stack([gap, gap_std, demand_std, factor, *received])
+    contact_std = np.array([0.0, 0.1, 0.0, 0.2, 0.0, 0.0, 0.1, 0.1])
+    return np.stack([gap, gap_std, demand_std, factor, *received, contact_std])
 
 
 def _chance(demands, gap, known):
@@ -50,15 +51,20 @@ def _chance(demands, gap, known):
 
 def _definition(motion, facts, deviates):
     demand, velocity, speed_1, speed_2, correlation = motion
-    median_gap, gap_std, demand_std, factor, received_1, received_2 = facts[:, :, None]
+    median_gap, gap_std, demand_std, factor, received_1, received_2, contact = facts[:, :, None]
     gap, scale = median_gap * np.exp(gap_std * deviates[1]), np.exp(demand_std * deviates[0])
     moving = scale * demand > gap
     share = np.divide(gap, scale * demand, out=np.ones(moving.shape), where=moving)
     loss = np.exp(-LOSS * np.sqrt(np.maximum(correlation, 0.0)) * (1.0 - share))
     impact = factor * scale * velocity * np.sqrt(1.0 - share**2) * loss
+    # a lognormal factor of mean 1, which the means do not need
+    by_contact = impact * np.exp(contact * deviates[2] - contact**2 / 2.0)
     changes = [
         np.divide(
-            RADIUS_SHARE * received * impact / scale, speed, out=0.0 * impact, where=speed > 0.0
+            RADIUS_SHARE * received * impact / scale,
+            speed,
+            out=0.0 * impact,
+            where=speed > 0.0,
         )
         for received, speed in ((received_1, speed_1), (received_2, speed_2))
     ]
@@ -66,7 +72,7 @@ def _definition(motion, facts, deviates):
         [
             _chance(demand, facts[0], np.hypot(facts[1], facts[2])),
             impact.mean(axis=1),
-            np.quantile(impact, QUANTILE, axis=1),
+            np.quantile(by_contact, QUANTILE, axis=1),
             np.sqrt(1.0 + np.maximum(*changes) ** 2).mean(axis=1),
         ]
     )
@@ -76,7 +82,7 @@ def _definition(motion, facts, deviates):
 def test_against_the_definition(nodes):
     # mutations: nodes of gap and demand exchanged, the factor left out, the quantile of another
     # rank, the larger of both spreads, chance of nodes that do not move
-    motion, facts, deviates = _motion(nodes), _facts(), RANDOM.normal(size=(2, nodes))
+    motion, facts, deviates = _motion(nodes), _facts(), RANDOM.normal(size=(3, nodes))
     found = np.empty((4, PAIRS))
     fill_outcomes(motion, facts, deviates, found)
     # the polynomial of the normal tail is exact to 1e-14
@@ -88,9 +94,9 @@ def test_against_the_definition(nodes):
 
 def _amplification(motion, received):
     """Return the amplification of one touching pair at one node."""
-    facts = np.array([0.0, 0.0, 0.0, 1.0, *received])[:, None]
+    facts = np.array([0.0, 0.0, 0.0, 1.0, *received, 0.0])[:, None]
     found = np.empty((4, 1))
-    fill_outcomes(np.reshape(motion, (5, 1, 1)), facts, np.zeros((2, 1)), found)
+    fill_outcomes(np.reshape(motion, (5, 1, 1)), facts, np.zeros((3, 1)), found)
     return found[3, 0]
 
 

@@ -242,6 +242,7 @@ class Details {
 
   inputText(name, value) {
     const { number } = this.page;
+    if (name === "period_correlation") return number(value, 2);
     if (name.startsWith("period")) return `${number(value, 2)} s`;
     if (name.startsWith("damping")) return `${number(100 * value, 1)} %`;
     return `${number(100 * value, 1)} cm`;
