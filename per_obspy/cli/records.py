@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.records.earthquakes.earthquake import Earthquake
+    from per_obspy.records.earthquakes.shakemap_product import ShakeMapFiles
 
 #: What the table of earthquakes shows of each.
 EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
@@ -81,6 +82,12 @@ def fetch(
         list[str] | None,
         typer.Option(help="SeedLink server (host:port) for records that no service has yet."),
     ] = None,
+    shakemap: Annotated[
+        bool, typer.Option("--shakemap", help="Fetch the ShakeMap of an earthquake too.")
+    ] = False,
+    map_version: Annotated[
+        str | None, typer.Option(help="Version of the ShakeMap; the preferred one if not given.")
+    ] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Ask again for stations that had no data.")
     ] = False,
@@ -91,17 +98,20 @@ def fetch(
 
     Example: per-obspy fetch us7000abcd -o records
     """
-    from per_obspy.runs.fetch import fetch_configured, fetch_event
+    from per_obspy.runs.fetch import fetch_configured, fetch_event, fetch_map
 
     # Options that are given count for an earthquake; a configuration has its own
     named = {"providers": provider, "event_provider": event_service, "seedlink": seedlink}
     settings = {name: value for name, value in named.items() if value}
     with shown_progress() as progress:
         if Path(source).suffix == ".toml" or Path(source).is_file():
-            _require_no_options(source, settings, folder)
+            _require_no_options(source, settings, folder or shakemap or map_version)
             place, stations, rejected = fetch_configured(Path(source), again, progress)
         else:
             target = folder or Path(source.replace(":", "-").replace("/", "-"))
+            # In the first minutes there is a map, and no record yet
+            if shakemap or map_version:
+                _print_map(source, fetch_map(source, target, event_service, map_version))
             found = fetch_event(source, target, settings | {"radius": radius}, again, progress)
             place, stations, rejected = found.folder, found.stations, found.rejected
     _print_fetched(place, stations, rejected, as_json)
@@ -120,7 +130,17 @@ def _print_fetched(
     _print_rejected(rejected)
 
 
-def _require_no_options(source: str, settings: "Mapping[str, object]", folder: Path | None) -> None:
+def _print_map(source: str, found: "ShakeMapFiles | None") -> None:
+    """Say on standard error which map there is, and how a run takes it."""
+    if found is None:
+        print(f"{source} has no ShakeMap yet: ask again later", file=sys.stderr)
+        return
+    names = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
+    options = " ".join(f"--set records.{name}={path}" for name, path in names.items() if path)
+    print(f"ShakeMap, version {found.version}: per-obspy run ... {options}", file=sys.stderr)
+
+
+def _require_no_options(source: str, settings: "Mapping[str, object]", folder: object) -> None:
     """Raise ``CatalogError`` if options of an earthquake are given with a configuration."""
     from per_obspy.errors import CatalogError
 

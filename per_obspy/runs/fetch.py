@@ -8,8 +8,10 @@ from per_obspy.config import Fdsn, Records, Run, checked, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
-from per_obspy.records.earthquakes.services import OTHERS, RECORDS_OF, event_of
+from per_obspy.records.earthquakes.services import OTHERS, PATIENCE, RECORDS_OF, event_of
+from per_obspy.records.earthquakes.shakemap_product import ShakeMapFiles, fetch_shakemap
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
+from per_obspy.records.fdsn.web import WebPool
 
 #: Radius around the epicentre in which stations of a named earthquake are wanted, m.
 RADIUS = 100_000.0
@@ -154,3 +156,36 @@ def fetch_event(
         found.rejected,
         Records(fdsn=request),
     )
+
+
+def fetch_map(
+    identifier: str, folder: Path, service: str | None = None, version: str | None = None
+) -> ShakeMapFiles | None:
+    """
+    Fetch the ShakeMap of an earthquake.
+
+    Parameters
+    ----------
+    identifier : str
+        As :func:`fetch_event` takes it.
+    folder : Path
+        Gets ``shakemap-VERSION``.
+    service : str, optional
+        Event service instead of the identifier's own.
+    version : str, optional
+        Number of a version; the preferred one if not given.
+
+    Returns
+    -------
+    ShakeMapFiles or None
+        None where there is no map yet, or the service lists none.
+
+    Raises
+    ------
+    CatalogError
+        If the identifier is wrong, or the version does not exist.
+    ServiceError
+        If the service fails.
+    """
+    provider, event_id = (service, identifier) if service else event_of(identifier)
+    return fetch_shakemap(WebPool(*PATIENCE), provider, event_id, folder, version)

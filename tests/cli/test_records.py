@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from fdsn_server import FdsnServer, serving, status
+from test_shakemap import FIELDS, grid_xml, make_rows
 
 from per_obspy.config import Scenario
 from per_obspy.runs.run import run
@@ -144,6 +145,16 @@ def test_fetch_takes_a_named_earthquake(server, tmp_path, call):
     assert code == 0, err
     assert "2 stations are in" in out
     assert (tmp_path / "quake" / "event-xx1.xml").is_file()
+
+
+def test_fetch_takes_the_shakemap_and_says_how_a_run_takes_it(server, tmp_path, call):
+    options = ("--provider", server.url, "--event-service", server.url, "-o", tmp_path / "x")
+    assert "no ShakeMap yet" in call("fetch", "xx1", *options, "--shakemap")[2]
+    server.add_map("1", grid_xml=grid_xml(FIELDS, make_rows(), (2, 3)).encode())
+    code, _, err = call("fetch", "xx1", *options, "--shakemap")
+    assert (code, "version 1: per-obspy run ... --set records.shakemap=" in err) == (0, True)
+    code, _, err = call("fetch", "xx1", *options, "--map-version", "9")
+    assert (code, "no version 9 of the ShakeMap, only 1" in err) == (2, True)
 
 
 def test_fetch_refuses_what_is_neither_configuration_nor_earthquake(configuration, call):

@@ -61,7 +61,7 @@ OTHERS = ("earthscope-federator", "eida-routing")
 EXPECTED = "us7000abcd, geonet:2016p858000, emsc:20161113_0000040 or ingv:8863681"
 
 #: Patience with a service that lists events: s, retries, s.
-_PATIENCE = (60.0, 3, 1.0)
+PATIENCE = (60.0, 3, 1.0)
 
 #: Columns of the text format of fdsnws-event 1.2.
 _TEXT_COLUMNS = 13
@@ -181,7 +181,7 @@ def _answered(
     url: str, read: Callable[[bytes], Listed], query: Mapping[str, str]
 ) -> list[Earthquake]:
     """Return the earthquakes in the answer of a service or feed."""
-    return _usable(url, lambda: read(answer(WebPool(*_PATIENCE), url, query)))
+    return _usable(url, lambda: read(answer(WebPool(*PATIENCE), url, query)))
 
 
 def listed_events(pool: WebPool, provider: str, query: Mapping[str, str]) -> Listed:
