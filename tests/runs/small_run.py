@@ -57,7 +57,8 @@ def write_smallest_configuration(folder: Path, text: str = "") -> Path:
 
 def plain_figure(*arguments: object) -> None:
     """Write a figure as a short file: most of the time of a small run goes into its figures."""
-    with written_whole(Path(str(arguments[-1]))) as part:
+    (path,) = (argument for argument in arguments if isinstance(argument, Path))
+    with written_whole(path) as part:
         part.write_bytes(b"a figure")
 
 
