@@ -115,9 +115,9 @@ CONCLUSIONS = """\
   low houses in this motion.
 * **How hard.** {worst} pairs are `severe` or `high`; {low} are `low`, below 0.05 m/s.
   Touching is not harm. The worst expected impact velocity is {velocity} m/s.
-* **How sure.** {sure} pairs are a `yes`. The others depend on an assumption: outlines are
-  drawn, so that half of those that touch count as one wall, and each gap is uncertain by 0.1
-  m. All periods are derived from storeys. The nearest station is {station}, {near} km away,
+* **How sure.** The state `yes` has {sure} of them. The others depend on an assumption: outlines
+  are drawn, so that half of those that touch count as one wall, and each gap is uncertain by
+  0.1 m. All periods are derived from storeys. The nearest station is {station}, {near} km away,
   and the ground of the houses is unknown. Buildings are elastic here.
 * **What first.** Go to {first}: measure the joint, count the storeys, see whether floors meet
   floors. Then down the list.
@@ -200,7 +200,7 @@ def draw_quarter(path: Path) -> None:
     layer = DATA / "inventories" / "footprints" / "san_jose_pilot_region_all_fields.gpkg"
     _, _, geometries, (numbers, storeys) = pyogrio.raw.read(layer, columns=["id", "n_storeys"])
     outlines = shapely.from_wkb(geometries)
-    drawn = shapely.is_valid_input(outlines) & ~np.isnan(numbers)
+    drawn = shapely.is_geometry(outlines) & ~np.isnan(numbers)
     # Longitudes widen with the latitude, so that widths in metres stay
     centre = shapely.get_coordinates(outlines[drawn]).mean(axis=0)[:2]
     wider = np.cos(np.deg2rad(centre[1])) / np.cos(np.deg2rad(TOWN[1]))
@@ -256,3 +256,7 @@ def ask(command: str, desk: Path) -> str:
     )
     text = done.stdout.replace(str(desk), "~").replace("python -m per_obspy", "per-obspy")
     return "\n".join(line for line in text.splitlines() if not re.search(r": \d+ of \d+$", line))
+
+
+if __name__ == "__main__":
+    main()
