@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 import pyogrio
 import shapely
+from PIL import Image
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("PER_OBSPY_DATA", CHECKOUT.parent / "shared" / "data"))
@@ -164,6 +165,7 @@ def session(desk: Path) -> str:
     mend = 'sed -i \'s/, "building:levels": "32"//\' quarter.geojson'
     parts += [typed(f"{mend}\n{run} --quiet\ncat out/summary.txt", desk)]
     shutil.copy(desk / "out" / "figures" / "worst_pair.png", FIGURES / "earthquake_pair.png")
+    shrink(FIGURES / "earthquake_pair.png")
     for name, width, height in (("page", 1280, 900), ("telephone", 400, 900)):
         photograph(desk / "out" / "report.html", FIGURES / f"earthquake_{name}.png", width, height)
     parts += [PICTURES, typed("per-obspy show '#1' out", desk), conclusions(desk / "out"), LAST]
@@ -229,7 +231,7 @@ def draw_quarter(path: Path) -> None:
 
 
 def photograph(page: Path, picture: Path, width: int, height: int) -> None:
-    """Draw the first screen of a page by Chromium, with few colours, if there is one."""
+    """Draw the first screen of a page by Chromium, if there is one."""
     browser = shutil.which("chromium")
     if browser is None:
         print(f"no chromium: {picture} stays as it is")
@@ -237,6 +239,14 @@ def photograph(page: Path, picture: Path, width: int, height: int) -> None:
     words = ["--headless", "--no-sandbox", "--hide-scrollbars", f"--window-size={width},{height}"]
     words += ["--virtual-time-budget=8000", f"--screenshot={picture}", page.as_uri()]
     subprocess.run([browser, *words], check=True, capture_output=True)
+    shrink(picture)
+
+
+def shrink(picture: Path) -> None:
+    """Keep 256 colours of a picture, which makes its file half as large."""
+    with Image.open(picture) as image:
+        few = image.convert("RGB").quantize(256)
+    few.save(picture, optimize=True)
 
 
 def typed(commands: str, desk: Path) -> str:
