@@ -29,7 +29,8 @@ extensions = [
 root_doc = "index"
 exclude_patterns = ["extensions", "gallery", "recipe", "generated/gallery/*.py"]
 
-myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "deflist", "dollarmath", "substitution"]
+myst_substitutions = {"version": version}
 myst_heading_anchors = 3
 suppress_warnings = ["config.cache"]  # functions of the gallery's configuration are not pickled
 
@@ -40,7 +41,7 @@ autodoc_preserve_defaults = True
 math_renderer = "mathml"
 
 html_theme = "sphinx_book_theme"
-html_title = "per_obspy"
+html_title = f"per_obspy {version}"
 # A font with stretching brackets and roots, which comes with ziamath (SIL Open Font Licence)
 html_static_path = ["static", str(files("ziamath") / "fonts")]
 html_css_files = ["site.css"]

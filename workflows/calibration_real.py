@@ -76,11 +76,10 @@ def page(rows: pd.DataFrame) -> Iterator[str]:
     yield from error_table(dict(iter(near.groupby("event"))))
     yield from ("", "### Probability by kind of pair", "")
     yield from kind_table(rows)
-    for title, some in (("record within 20 km", rows[rows["distance"] <= NEAR]), ("all", rows)):
-        yield from ("", f"### Reliability, {title}", "")
-        yield "Mean probability: share of larger demands ± deviation, places dependent (cases)."
-        yield ""
-        yield from bin_table(some)
+    yield from ("", "### Reliability, record within 20 km", "")
+    yield "Mean probability: share of larger demands ± deviation, places dependent (cases)."
+    yield ""
+    yield from bin_table(rows[rows["distance"] <= NEAR])
 
 
 def error_table(groups: dict[str, pd.DataFrame]) -> Iterator[str]:

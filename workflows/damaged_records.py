@@ -2,7 +2,7 @@
 Damage one station of real records in 48 ways, run each, and print what is said of the station.
 
 Run: ``python workflows/damaged_records.py FOLDER [STATION]`` with a folder of raw MiniSEED and
-StationXML, and QuakeML if there is some; prints the table of docs/processing.md. Every variant is a
+StationXML, and QuakeML if there is some; prints what docs/processing.md sums up. Every variant is a
 whole run with the other stations unchanged; they are resumed. STATION is ``NET.STA``; without it,
 the station with the largest samples. Found is what gets a flag, warning or rejection that names the
 fault; another one is printed as "other reason". It takes a few minutes.

@@ -2,9 +2,9 @@
 Compare PER of real records with PER of the same records after a known shift of their baseline.
 
 Run: ``python workflows/known_shifts.py PEAK FOLDER [FOLDER ...]`` with folders of raw records;
-prints the tables of docs/processing.md. A record is a truth where the processing finds no fault of
-its baseline and its peak is at least PEAK, m/s². Shifts start at 10, 30 and 50 % of the energy in
-turn.
+prints the tables of which docs/processing.md has rows. A record is a truth where the processing
+finds no fault of its baseline and its peak is at least PEAK, m/s². Shifts start at 10, 30 and 50 %
+of the energy in turn.
 """
 
 import logging

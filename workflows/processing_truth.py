@@ -1,8 +1,8 @@
 """
 Compare processed motion with the known truth after noise, drifts and baseline shifts were added.
 
-Run: ``python workflows/processing_truth.py docs/figures/processing_truth.png``; prints the table of
-docs/processing.md and draws the figure.
+Run: ``python workflows/processing_truth.py docs/figures/processing_truth.png``; prints what
+docs/processing.md sums up, and draws the figure.
 """
 
 import sys

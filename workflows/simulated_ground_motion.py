@@ -3,11 +3,11 @@ Simulated ground motion against published ground-motion models: medians and devi
 
     python workflows/simulated_ground_motion.py [REPETITIONS]
 
-prints the table of docs/simulation.md. It needs pygmm (extra ``benchmark``). Response spectra of
-simulated earthquakes, one place of each, stand against the mean of four models of NGA-West2
-(Abrahamson and others, Boore and others, Campbell & Bozorgnia, Chiou & Youngs; all 2014): vertical
-strike-slip fault, generic rock of Vs30 620 m/s. The distance of the models is that to the rupture,
-the one of the simulation that to the point source.
+prints the table of which docs/simulation.md has rows. It needs pygmm (extra ``benchmark``).
+Response spectra of simulated earthquakes, one place of each, stand against the mean of four models
+of NGA-West2 (Abrahamson and others, Boore and others, Campbell & Bozorgnia, Chiou & Youngs; all
+2014): vertical strike-slip fault, generic rock of Vs30 620 m/s. The distance of the models is
+that to the rupture, the one of the simulation that to the point source.
 """
 
 import sys

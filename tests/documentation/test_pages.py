@@ -1,6 +1,7 @@
 """Pages that are made from the code name everything: keys, commands, columns, public names."""
 
 import importlib.util
+import re
 import sys
 
 import api_pages
@@ -80,6 +81,21 @@ def test_every_page_is_reached_from_the_first_one():
         if page.parent != ROOT and page.stem != "index"
     ]
     assert [name for name in names if f"\n{name}\n" not in text] == []
+
+
+def test_every_module_and_function_that_the_architecture_names_is_there():
+    # would catch a page that was renamed, or a step that moved to another room
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:\w+/)+(?:\w+\.\w+)?)(?::(\w+))?`", text)
+    package = ROOT / "per_obspy"
+    missing = [p for p, _ in named if not ((package / p).exists() or (ROOT / p).exists())]
+    missing += [
+        f"{path}:{name}"
+        for path, name in named
+        if name and not re.search(rf"(def|class) {name}\b", (package / path).read_text("utf-8"))
+    ]
+    assert len(named) > 60
+    assert missing == []
 
 
 def test_the_readme_has_at_most_120_lines_and_names_the_three_users():
