@@ -3,7 +3,8 @@ Open a project of layers in QGIS itself, without a display, and draw it with its
 
 Needs QGIS and the Python of the system (Debian: ``apt-get install python3-qgis qgis-providers``):
 ``QT_QPA_PLATFORM=offscreen /usr/bin/python3 workflows/qgis_picture.py risk.qgz picture.png``.
-It ends with code 1 if the project or one of its layers cannot be read.
+A third argument, ``form.png``, draws the form of an inspection too. It ends with code 1 if the
+project or one of its layers cannot be read.
 """
 
 import os
@@ -17,12 +18,13 @@ from qgis.core import (
     QgsPrintLayout,
     QgsProject,
 )
-from qgis.PyQt.QtCore import QRectF
+from qgis.gui import QgsAttributeForm, QgsGui
+from qgis.PyQt.QtCore import QRectF, QSize
 
 
-def main(project: str, picture: str) -> int:
+def main(project: str, picture: str, form: str = "") -> int:
     """Print every layer with its classes and aliases, draw all of them, return the exit code."""
-    application = QgsApplication([], False)
+    application = QgsApplication([], bool(form))
     application.initQgis()
     opened = QgsProject.instance()
     if not opened.read(project):
@@ -35,7 +37,21 @@ def main(project: str, picture: str) -> int:
     print(f"reference system {opened.crs().authid()}")
     (pairs,) = (layer for layer in layers if layer.name() == "pairs")
     _draw(opened, layers, pairs.extent(), picture)
+    if form:
+        (inspections,) = (layer for layer in layers if layer.name() == "inspections")
+        _draw_form(application, inspections, form)
     return 0 if all(layer.isValid() for layer in layers) else 1
+
+
+def _draw_form(application, layer, picture):
+    """Draw the form of the worst pair as it opens in the field."""
+    QgsGui.editorWidgetRegistry().initEditors()
+    layer.startEditing()
+    form = QgsAttributeForm(layer, next(layer.getFeatures()))
+    form.resize(QSize(560, 420))
+    form.show()
+    application.processEvents()
+    form.grab().save(picture)
 
 
 def _draw(project, layers, extent, picture):
