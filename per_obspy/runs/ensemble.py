@@ -28,7 +28,6 @@ from per_obspy.results.risk import write_worst
 from per_obspy.results.table_files import write_described, write_rejected
 from per_obspy.resume import earlier_status
 from per_obspy.runs.inputs.extras import require_extras
-from per_obspy.runs.inputs.preflight import check_inputs
 from per_obspy.runs.output_folder import (
     Result,
     file_hashes,
@@ -37,6 +36,7 @@ from per_obspy.runs.output_folder import (
     recorded,
     software_versions,
 )
+from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.results.scenario_runs import ScenarioRun, ScenarioRuns
 from per_obspy.runs.results.table_report import report_ensemble
 from per_obspy.runs.run import run

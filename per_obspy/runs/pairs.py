@@ -1,4 +1,8 @@
-"""Files with the pairs of a run: a given table, stored inventories, or simulated pairs."""
+"""
+Pairs of a run: a given table, stored inventories, or simulated pairs.
+
+What later stages need of them is checked before the first record is read.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +19,10 @@ from per_obspy.inventory.catalogue import (
     stored_inventories,
     verified_file,
 )
+from per_obspy.inventory.files.formats import pair_file
+from per_obspy.inventory.files.reading import checked_file
 from per_obspy.inventory.files.writing import write_pairs
+from per_obspy.records.shakemap import read_shakemap
 from per_obspy.runs.inputs.drawn_pairs import pair_table
 from per_obspy.runs.tasks.ground_files import StationFile
 from per_obspy.screening.assignment import nearest_station
@@ -53,6 +60,64 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
         return _stored(pairs, pairs.catalog, stations, settings.screening.largest_distance)
     write_pairs(_simulated(pair_simulation(settings), stations), folder / "pairs.csv")
     return [folder / "pairs.csv"]
+
+
+def check_inputs(settings: Run, folder: Path) -> None:
+    """
+    Check the head of the pair table, the named inventories, the area, and the whole ShakeMap.
+
+    Parameters
+    ----------
+    settings : Run
+        Settings of the run.
+    folder : Path
+        Of the results, where the pairs of footprints are.
+
+    Raises
+    ------
+    CatalogError
+        If one of them cannot be read or has changed, or the table lacks a column.
+    """
+    pairs = settings.pairs
+    table = pair_table(settings, folder)
+    if pairs and pairs.footprints and not pairs.footprints.file.is_file():
+        raise CatalogError(str(pairs.footprints.file), "no such file")
+    # Pairs of footprints may be yet to be found
+    is_pending = bool(pairs and pairs.footprints and table and not table.is_file())
+    if pairs and table and not is_pending:
+        checked_file(table, pairs.form)
+    if pairs and pairs.catalog and pairs.names:
+        named_files(pairs.names, pairs.catalog)
+    if settings.records and settings.records.shakemap:
+        read_shakemap(settings.records.shakemap, settings.records.shakemap_uncertainty)
+    if not is_pending:
+        _check_area(settings, folder)
+
+
+def _check_area(settings: Run, folder: Path) -> None:
+    """Check that the pairs have the column of the areas of the totals."""
+    area = settings.totals.area
+    if area is not None and area not in _pair_columns(settings, folder):
+        raise CatalogError("totals", f"area: the pair table has no column {area!r}")
+
+
+def _pair_columns(settings: Run, folder: Path) -> set[str]:
+    """Return the columns of the pairs; of several stored inventories those of any."""
+    pairs = settings.pairs
+    if pairs and (table := pair_table(settings, folder)):
+        return set(pair_file(table, pairs.form).names)
+    if pairs and pairs.catalog and pairs.names:
+        files = named_files(pairs.names, pairs.catalog)
+        return set.intersection(*(set(pair_file(file).names) for file in files))
+    if pairs and pairs.catalog:
+        # The region of the stations decides later which of them are taken
+        stored = [entry.file for entry in stored_inventories(pairs.catalog)]
+        columns = [set(pair_file(file).names) for file in stored if file.is_file()]
+        return set[str]().union(*columns)
+    # One simulated pair has the columns of all, and perhaps the site class of its station
+    simulation = pair_simulation(settings).model_copy(update={"count": 1})
+    simulated = simulated_pairs(np.zeros(1), np.zeros(1), **simulation.model_dump())
+    return {*simulated.columns, "site_class"}
 
 
 def pair_simulation(settings: Run) -> SimulatedPairs:

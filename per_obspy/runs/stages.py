@@ -17,7 +17,6 @@ from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.station_summary import write_stations
 from per_obspy.runs.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
-from per_obspy.runs.inputs.preflight import check_inputs
 from per_obspy.runs.losses import losses
 from per_obspy.runs.output_folder import (
     RECORD,
@@ -28,6 +27,7 @@ from per_obspy.runs.output_folder import (
     recorded,
     software_versions,
 )
+from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.provenance import RunContext, RunSettings
 from per_obspy.runs.record import KnownStations, RunRecord, earlier_facts, station_facts
 from per_obspy.runs.report import reported

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from distributed import Client
 
 from per_obspy.config.engine import Engine
-from per_obspy.runs.tasks.cluster.dask_executor import DaskExecutor
+from per_obspy.runs.tasks.executor import DaskExecutor
 from per_obspy.runs.tasks.parallel import Work, Workers, results
 
 TASKS, WORKERS = (1_000, 10_000, 100_000), 2

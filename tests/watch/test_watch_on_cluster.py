@@ -13,7 +13,7 @@ from ..runs.small_run import InProcess, plain_figures
 
 pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
-from per_obspy.runs.tasks.cluster import dask_executor
+from per_obspy.runs.tasks import executor as dask_executor
 
 pytestmark = pytest.mark.long
 

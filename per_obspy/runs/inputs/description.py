@@ -325,21 +325,24 @@ def _of_pairs(path: Path) -> Description:
     inventory = PairInventory([path])
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
+    reasons = [(f"line {one['row']}", one["reasons"]) for one in rejected]
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
     # Ranges, derived and unknown columns, what is odd, and rejections
     odd = [("suspicious", sentence) for sentence in inventory.suspicions.sentences()]
-    lines = [*_range_lines(table), *_column_lines(derived, unused), *odd]
-    lines += _rejected_lines([(f"line {one['row']}", one["reasons"]) for one in rejected])
+    columns = _column_lines(derived, unused)
+    lines = [*_range_lines(table), *columns, *odd, *_rejected_lines(reasons)]
     # Only the first rows of a large table are read
-    rows = inventory.count
-    first = f"the first {MOST_ROWS} of " * (rows > MOST_ROWS)
-    title = f"{first}{rows} rows, {len(table)} usable, {len(rejected)} rejected"
-    values = {
-        "rows": rows, "usable": len(table), "derived": derived,
-        "unknown": unused, "rejected": rejected,
-    }  # fmt: skip
+    counts = {"rows": inventory.count, "usable": len(table), "rejected": len(rejected)}
+    values = {**counts, "derived": derived, "unknown": unused, "rejected": rejected}
+    title = _title(counts)
     return Description(Kind.PAIRS, title, lines, {"": _centres(table)}, values, not table.empty)
+
+
+def _title(counts: Mapping[str, int]) -> str:
+    """Return the size of a pair table, of which the first rows are read if it is large."""
+    first = f"the first {MOST_ROWS} of " if counts["rows"] > MOST_ROWS else ""
+    return f"{first}{counts['rows']} rows, {counts['usable']} usable, {counts['rejected']} rejected"
 
 
 def _column_lines(derived: Mapping[str, int], unused: Sequence[str]) -> Lines:

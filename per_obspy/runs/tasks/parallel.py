@@ -241,11 +241,15 @@ def finish(tasks: Iterable[Resumable[Result]], workers: Workers) -> Iterator[Res
                 else:
                     resumed.append(found)
 
-    # Resumed results are passed on as soon as the next one is finished
-    for result in _all_results(missing(), watched, workers):
+    # Resumed results are passed on as soon as the next one is finished, or none can be written
+    try:
+        for result in _all_results(missing(), watched, workers):
+            yield from resumed
+            resumed.clear()
+            yield result
+    except (WriteError, WrongOutput):
         yield from resumed
-        resumed.clear()
-        yield result
+        raise
     yield from resumed
     if faults:
         raise Unfinished(*faults)

@@ -17,7 +17,7 @@ from per_obspy.errors import CatalogError, MissingExtra
 from per_obspy.inventory.catalogue import Origin, add_inventory
 from per_obspy.runs import stages
 from per_obspy.runs.ensemble import screen_scenarios
-from per_obspy.runs.inputs.preflight import check_inputs
+from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.run import report, run, screen
 from per_obspy.screening import warmup
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from per_obspy.config import Processing, Scenario, Spectra
-from per_obspy.errors import CatalogError, Unfinished, WrongOutput
+from per_obspy.errors import CatalogError, Unfinished, WriteError, WrongOutput
 from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.folder import read_station
 from per_obspy.records.sources import find_path_sources
@@ -163,6 +163,21 @@ def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
     assert unfinished.value.faults == (f"station XX.S2: {DIED}",)
     assert sorted(stations) == ["XX.S0", "XX.S1", "XX.S3"]
     assert not batch[2].shard.with_suffix(".json").exists()
+
+
+def test_a_full_disk_takes_no_resumed_station_with_it(make_jobs, monkeypatch):
+    # Mutation: the earlier results are passed on after the next new one only
+    first, second = make_jobs()
+    done([first])
+
+    def full(_task):
+        raise WriteError("disk", "no space left")
+
+    monkeypatch.setattr(StationTask, "do", full)
+    stations = list[str]()
+    with pytest.raises(WriteError):
+        stations.extend(station.station for station in finish([first, second], Workers(1)))
+    assert stations == [first.station]
 
 
 def _raises(job):

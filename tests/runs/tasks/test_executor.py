@@ -1,7 +1,7 @@
 """
 Tasks on two worker processes of a Dask cluster: none is lost whatever happens to a worker.
 
-Tests per_obspy.runs.tasks.cluster.
+Tests per_obspy.runs.tasks.executor.
 """
 
 import os
@@ -12,8 +12,8 @@ import pytest
 
 from per_obspy.config.engine import Engine
 from per_obspy.errors import ServiceError, TryLater, Unfinished
-from per_obspy.runs.tasks.cluster import worker_side
-from per_obspy.runs.tasks.cluster.dask_executor import DaskExecutor, present_workers
+from per_obspy.runs.tasks import cluster_worker as worker_side
+from per_obspy.runs.tasks.executor import DaskExecutor, present_workers
 from per_obspy.runs.tasks.parallel import AHEAD, Work, Workers, results
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
@@ -137,7 +137,7 @@ def test_a_task_that_kills_every_worker_stays_undone(executor, tmp_path):
 
 def changed(client, text, **where):
     """Change the module of the worker side on workers: they cannot import this one."""
-    text = f"import per_obspy.runs.tasks.cluster.worker_side as side; {text}"
+    text = f"import per_obspy.runs.tasks.cluster_worker as side; {text}"
     client.run(exec, text, {}, **where)
 
 

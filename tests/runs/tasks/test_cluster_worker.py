@@ -9,8 +9,8 @@ from threading import Timer
 import pytest
 
 from per_obspy.errors import CatalogError, MachineFault
-from per_obspy.runs.tasks.cluster import worker_side
-from per_obspy.runs.tasks.cluster.worker_side import (
+from per_obspy.runs.tasks import cluster_worker as worker_side
+from per_obspy.runs.tasks.cluster_worker import (
     LARGEST_MESSAGE,
     Shared,
     do_sent,
