@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.cli.printing import AsJson, named_path, print_table, stop_if_nothing
+from per_obspy.cli.printing import (
+    AsJson,
+    files_to_open,
+    named_path,
+    print_table,
+    stop_if_nothing,
+)
 from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
@@ -99,7 +105,12 @@ def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
     drawn = text_map(found.places)
     named = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"
     head = ": ".join(part for part in (named, found.kind, found.title) if part)
-    facts = [line for fact in _with_place(found, bool(drawn)) for line in _wrapped(found, *fact)]
+    named_facts = _with_place(found, bool(drawn))
+    # Of a result, what a person opens first
+    outputs = found.values.get("outputs", ())
+    if to_open := files_to_open(outputs, "ensemble" if "ensemble.csv" in outputs else "risk"):
+        named_facts = [("open", ", then ".join(to_open)), *named_facts]
+    facts = [line for fact in named_facts for line in _wrapped(found, *fact)]
     # Facts that have no room are counted
     room = HEIGHT - 1 - len(drawn) - taken
     if len(facts) > room:
