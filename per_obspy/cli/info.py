@@ -1,7 +1,6 @@
 """``per-obspy info``: describe an input or a result on one screen."""
 
 import json
-import sys
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from per_obspy.cli.printing import (
     AsJson,
     files_to_open,
     named_path,
+    print_rejected,
     print_table,
     stop_if_nothing,
 )
@@ -83,7 +83,7 @@ def info(
             print(line)
         if everything and found.kind == "records":
             _print_records(found.values["records"])
-        _print_rejected(few, len(rejected), None if everything else WIDTH)
+        print_rejected(few, len(rejected), None if everything else WIDTH)
     stop_if_nothing(int(found.usable))
 
 
@@ -147,12 +147,3 @@ def _cells(record: dict[str, Any]) -> list[object]:
     """Return the cells of a record, times to the second, empty where a value is unknown."""
     known = record | {"start": record["start"][:19]}
     return ["" if known[name] is None else known[name] for name in SHOWN]
-
-
-def _print_rejected(rejected: Sequence[dict[str, Any]], count: int, width: int | None) -> None:
-    """Print rejections with their reasons on standard error, and the number of the others."""
-    for one in rejected:
-        line = f"rejected {one['kind']} {one['name']}: {'; '.join(one['reasons'])}"
-        print(shortened(line, width) if width else printable(line), file=sys.stderr)
-    if count > len(rejected):
-        print(f"and {count - len(rejected)} more rejected: --all", file=sys.stderr)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from per_obspy.errors import printable
+from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -119,6 +119,17 @@ def _print_line(stage: str, done: int, total: int) -> None:
     """Print one line of progress; a closed standard error does not stop the work."""
     with suppress(BrokenPipeError):
         print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+
+
+def print_rejected(
+    rejected: "Sequence[Mapping[str, Any]]", count: int, width: int | None = None
+) -> None:
+    """Print rejections with their reasons on standard error, and the number of the others."""
+    for one in rejected:
+        line = f"rejected {one['kind']} {one['name']}: {'; '.join(one['reasons'])}"
+        print(shortened(line, width) if width else printable(line), file=sys.stderr)
+    if count > len(rejected):
+        print(f"and {count - len(rejected)} more rejected: --all", file=sys.stderr)
 
 
 #: Files of every result that people open, in this order: name, with the stem of its table, and
