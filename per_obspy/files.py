@@ -132,7 +132,7 @@ def written_whole(path: Path) -> Iterator[Path]:
             # Readers see the old file or the whole new one, never a half, also after a power cut
             _sync(part)
             part.replace(path)
-            _sync_folder(path.parent)
+            sync_folder(path.parent)
     finally:
         _remove_part(part)
 
@@ -146,7 +146,7 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Wait until the names in a folder are on the disk, where the system can do that."""
     if os.name == "posix":
         with suppress(OSError):

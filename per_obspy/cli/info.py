@@ -1,7 +1,6 @@
 """``per-obspy info``: describe an input or a result on one screen."""
 
 import json
-import sys
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.cli.printing import AsJson, named_path, print_table, stop_if_nothing
+from per_obspy.cli.printing import (
+    AsJson,
+    files_to_open,
+    named_path,
+    print_rejected,
+    print_table,
+    stop_if_nothing,
+)
 from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
@@ -77,7 +83,7 @@ def info(
             print(line)
         if everything and found.kind == "records":
             _print_records(found.values["records"])
-        _print_rejected(few, len(rejected), None if everything else WIDTH)
+        print_rejected(few, len(rejected), None if everything else WIDTH)
     stop_if_nothing(int(found.usable))
 
 
@@ -99,7 +105,12 @@ def screen_of(path: str, found: "Description", taken: int = 0) -> list[str]:
     drawn = text_map(found.places)
     named = path if len(path) <= LONGEST_PATH else f"…{path[-LONGEST_PATH:]}"
     head = ": ".join(part for part in (named, found.kind, found.title) if part)
-    facts = [line for fact in _with_place(found, bool(drawn)) for line in _wrapped(found, *fact)]
+    named_facts = _with_place(found, bool(drawn))
+    # Of a result, what a person opens first
+    outputs = found.values.get("outputs", ())
+    if to_open := files_to_open(outputs, "ensemble" if "ensemble.csv" in outputs else "risk"):
+        named_facts = [("open", ", then ".join(to_open)), *named_facts]
+    facts = [line for fact in named_facts for line in _wrapped(found, *fact)]
     # Facts that have no room are counted
     room = HEIGHT - 1 - len(drawn) - taken
     if len(facts) > room:
@@ -136,12 +147,3 @@ def _cells(record: dict[str, Any]) -> list[object]:
     """Return the cells of a record, times to the second, empty where a value is unknown."""
     known = record | {"start": record["start"][:19]}
     return ["" if known[name] is None else known[name] for name in SHOWN]
-
-
-def _print_rejected(rejected: Sequence[dict[str, Any]], count: int, width: int | None) -> None:
-    """Print rejections with their reasons on standard error, and the number of the others."""
-    for one in rejected:
-        line = f"rejected {one['kind']} {one['name']}: {'; '.join(one['reasons'])}"
-        print(shortened(line, width) if width else printable(line), file=sys.stderr)
-    if count > len(rejected):
-        print(f"and {count - len(rejected)} more rejected: --all", file=sys.stderr)

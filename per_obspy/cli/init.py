@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from per_obspy.cli.printing import named_path, output_option
+from per_obspy.cli.printing import TO_OPEN, named_path, output_option
 from per_obspy.errors import printable
 
 
@@ -27,6 +27,7 @@ def init(
 
     Example: per-obspy init records pairs.csv -o run.toml
     """
+    from per_obspy.config.section import read_toml
     from per_obspy.runs.inputs.discovery import write_first_configuration
 
     # An empty name would be the folder of the shell
@@ -36,6 +37,8 @@ def init(
     lines = write_first_configuration(output, records, pairs, force)
     for line in (*lines, f"{output} is written; next: per-obspy run {output}"):
         print(printable(line))
+    results = output.parent / str(read_toml(output)["output"])
+    print(printable(f"then open, in this order: {', '.join(TO_OPEN).format('risk')} in {results}"))
 
 
 def warm_up() -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from per_obspy.errors import printable
+from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -119,6 +119,48 @@ def _print_line(stage: str, done: int, total: int) -> None:
     """Print one line of progress; a closed standard error does not stop the work."""
     with suppress(BrokenPipeError):
         print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+
+
+def print_rejected(
+    rejected: "Sequence[Mapping[str, Any]]", count: int, width: int | None = None
+) -> None:
+    """Print rejections with their reasons on standard error, and the number of the others."""
+    for one in rejected:
+        line = f"rejected {one['kind']} {one['name']}: {'; '.join(one['reasons'])}"
+        print(shortened(line, width) if width else printable(line), file=sys.stderr)
+    if count > len(rejected):
+        print(f"and {count - len(rejected)} more rejected: --all", file=sys.stderr)
+
+
+#: Files of every result that people open, in this order: name, with the stem of its table, and
+#: meaning.
+TO_OPEN = {
+    "report.html": "the page: which pairs, where, how sure, what first",
+    "{}.csv": "the pairs, the worst first",
+    "rejected.csv": "what was left out, and why",
+}
+
+
+def files_to_open(names: "Iterable[str]", table: str = "risk") -> dict[str, str]:
+    """
+    Return the files of a result to open, in their order, with their meanings.
+
+    Examples
+    --------
+    >>> list(files_to_open(["run.json", "risk.csv", "report.html"]))
+    ['report.html', 'risk.csv']
+    """
+    meanings = {name.format(table): meaning for name, meaning in TO_OPEN.items()}
+    given = set(names)
+    return {name: meaning for name, meaning in meanings.items() if name in given}
+
+
+def print_files(folder: Path, names: "Iterable[str]", table: str = "risk") -> None:
+    """Print the number of files of a result, and as the last lines those to open, in order."""
+    given = set(names)
+    print(f"{len(given)} files are in {printable(str(folder))}. Open in this order:")
+    for name, meaning in files_to_open(given, table).items():
+        print(f"  {printable(str(folder / name))}: {meaning}")
 
 
 #: Exit codes; 0 is done, and 1 is left to crashes, which are bugs.

@@ -1,13 +1,18 @@
 """``per-obspy events`` and ``fetch``: list earthquakes and fetch their records."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.cli.printing import AsJson, print_table, shown_progress, stop_if_nothing
+from per_obspy.cli.printing import (
+    AsJson,
+    print_rejected,
+    print_table,
+    shown_progress,
+    stop_if_nothing,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -122,12 +127,12 @@ def _print_fetched(
     folder: Path, stations: list[str], rejected: "tuple[Rejection, ...]", as_json: bool
 ) -> None:
     """Print the records in a cache, as JSON or as text."""
+    rows = [rejection._asdict() for rejection in rejected]
     if as_json:
-        rows = [rejection._asdict() for rejection in rejected]
         print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
         return
     print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
-    _print_rejected(rejected)
+    print_rejected(rows, len(rows))
 
 
 def _print_map(source: str, found: "ShakeMapFiles | None") -> None:
@@ -156,10 +161,3 @@ def _event_cells(row: "Earthquake") -> list[object]:
     # Time to the second, position to 100 m
     position = (f"{row.latitude:.3f}", f"{row.longitude:.3f}")
     return [row.event_id, row.time[:19], *position, depth, magnitude, row.place]
-
-
-def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:
-    """Print every rejection with all its reasons on standard error."""
-    for rejection in rejected:
-        reasons = "; ".join(rejection.reasons)
-        print(f"rejected {rejection.kind} {rejection.name}: {reasons}", file=sys.stderr)

@@ -17,6 +17,7 @@ from per_obspy.cli.printing import (
     output_option,
     percent,
     print_and_end,
+    print_files,
     print_table,
     shown_progress,
     state_texts,
@@ -301,8 +302,6 @@ def print_nothing(result: "Result") -> None:
 
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
-    from per_obspy.results.ranked_table import listed_outputs
-
     folder, record = result.folder, result.record
     if result.did_nothing:
         print("Up to date: these inputs were run before.")
@@ -314,8 +313,8 @@ def print_result(result: "Result") -> None:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
         _print_worst(folder, 10)
-    for name in listed_outputs({*record["outputs"], "run.json", "configuration.toml"}):
-        print(f"  {folder / name}")
+    print(printable(f"per-obspy run {folder / 'configuration.toml'} does it again."))
+    print_files(folder, {*record["outputs"], "run.json", "configuration.toml"})
 
 
 def _print_counts(record: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from per_obspy.cli.printing import (
     output_option,
     percent,
     print_and_end,
+    print_files,
     print_table,
     state_texts,
     stop_if_nothing,
@@ -226,7 +227,8 @@ def _print_spectrum_result(
         "the radius is SD, a design spectrum has no PER"
     )
     _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
-    print(*files, sep="\n")
+    folder = files[-1].parent
+    print_files(folder, [path.relative_to(folder).as_posix() for path in files], "design")
 
 
 def _print_ensemble(result: "Result") -> None:
@@ -250,8 +252,7 @@ def _print_ensemble(result: "Result") -> None:
     texts = {"pair_id": str, "worst_scenario": str}
     worst = pd.read_csv(folder / "ensemble.csv", nrows=WORST, dtype=texts)
     _print_worst(worst, [name for name in ENSEMBLE_COLUMNS if name in worst])
-    for name in sorted({*record["outputs"], "ensemble.json"}):
-        print(f"  {folder / name}")
+    print_files(folder, {*record["outputs"], "ensemble.json"}, "ensemble")
 
 
 def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") -> None:

@@ -258,20 +258,6 @@ class Archives(Section):
             "on; archives above it are left out"
         ),
     )
-    most_members: int = Field(
-        1_000_000,
-        gt=0,
-        description="largest number of files of an archive; archives with more are left out",
-    )
-    most_levels: int = Field(
-        3,
-        ge=1,
-        le=5,
-        description=(
-            "largest depth of archives inside archives, whose files share the limits of the "
-            "outermost one; 1: archives inside an archive are not opened"
-        ),
-    )
 
 
 class Records(Section):

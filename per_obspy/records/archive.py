@@ -35,6 +35,9 @@ IRREGULAR = "is no regular file"
 #: Limits where no configuration gives others.
 LIMITS = Archives()
 
+#: Most files of an archive with all archives inside it, and most levels of these.
+MOST_FILES, MOST_LEVELS = 1_000_000, 3
+
 #: Size of an archive below which its ratio of unpacked to packed bytes is not checked.
 SMALL = 64 * 2**20
 
@@ -203,15 +206,17 @@ class Allowance:
         """Refuse the archive if that many bytes more are beyond the limits."""
         limits, total = self.limits, self.total + size
         # The sum of all files, and its ratio to the archive as it is stored
-        if self.files > limits.most_members:
-            problem = f"most_members = {limits.most_members} files"
+        if self.files > MOST_FILES:
+            problem = f"{MOST_FILES} files"
         elif total > limits.largest_total:
-            problem = f"largest_total = {limits.largest_total} bytes"
+            problem = f"records.archives.largest_total = {limits.largest_total} bytes"
         elif total > max(limits.largest_ratio * self.size, SMALL):
-            problem = f"largest_ratio = {limits.largest_ratio:g} times its packed size"
+            problem = (
+                f"records.archives.largest_ratio = {limits.largest_ratio:g} times its packed size"
+            )
         else:
             return
-        problem = f"the archive unpacks to more than records.archives.{problem}"
+        problem = f"the archive unpacks to more than {problem}"
         raise BeyondLimits(self.path, f"{problem}: unpack it by hand")
 
 
@@ -323,9 +328,8 @@ class Archive:
         # A name that leads elsewhere, an archive too deep, a file too large
         if problem := name_problem(name):
             return f"its name {problem}"
-        if is_archive(Path(name)) and self.level >= limits.most_levels:
-            limit = f"records.archives.most_levels = {limits.most_levels}"
-            return f"is an archive inside archives, deeper than {limit}: unpack the outer one first"
+        if is_archive(Path(name)) and self.level >= MOST_LEVELS:
+            return f"is an archive deeper than {MOST_LEVELS} levels: unpack the outer one first"
         if size > limits.largest_member:
             limit = f"larger than records.archives.largest_member = {limits.largest_member}"
             return f"unpacks to {size} bytes, {limit}"

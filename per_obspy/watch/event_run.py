@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.config import Fdsn, Run
+from per_obspy.config.screening import EVERY_STATE
 from per_obspy.errors import ServiceError
 from per_obspy.files import content_hash, file_hash, written_whole
 from per_obspy.progress import Progress
@@ -338,7 +339,6 @@ def counts_line(record: Mapping[str, Any]) -> str:
     '3 stations (1 as before), 9 pairs: 2 yes'
     """
     counts = record["counts"]
-    states = ("yes", "likely", "possible", "unlikely", "no", "unknown")
-    named = ", ".join(f"{counts[name]} {name}" for name in states if counts.get(name))
+    named = ", ".join(f"{counts[name]} {name}" for name in EVERY_STATE if counts.get(name))
     resumed = counts.get("stations_resumed", 0)
     return f"{counts['stations']} stations ({resumed} as before), {counts['pairs']} pairs: {named}"

@@ -13,6 +13,7 @@ from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import Box, stored_inventories
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
+from per_obspy.screening.motion_field import great_circle
 from per_obspy.watch.state import read_json, write_json
 
 #: Side of the cells that stand for the pairs in them, degrees.
@@ -172,19 +173,9 @@ def distances(places: Places, longitude: FloatArray, latitude: FloatArray) -> Fl
     size = max(1, AT_ONCE // len(places.longitude))
     for start in range(0, len(longitude), size):
         some = slice(start, start + size)
-        angles = _angles(places, longitude[some, None], latitude[some, None])
-        nearest[some] = angles.min(axis=1)
-    return np.maximum(np.rad2deg(nearest) * METRES_PER_DEGREE - places.radius, 0.0)
-
-
-def _angles(places: Places, longitude: FloatArray, latitude: FloatArray) -> FloatArray:
-    """Compute angles between epicentres and places by the haversine formula, radians."""
-    east = np.deg2rad(longitude - places.longitude)
-    north, other = np.deg2rad(latitude), np.deg2rad(places.latitude)
-    # Accurate for small angles as well
-    half = np.sin((north - other) / 2) ** 2 + np.cos(north) * np.cos(other) * np.sin(east / 2) ** 2
-    angles: FloatArray = 2 * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0)))
-    return angles
+        east, north = longitude[some, None], latitude[some, None]
+        nearest[some] = great_circle(east, north, *places[:2]).min(axis=1)
+    return np.maximum(nearest - places.radius, 0.0)
 
 
 def circle_around(places: Places, reach: float) -> Circle:
@@ -204,11 +195,9 @@ def circle_around(places: Places, reach: float) -> Circle:
     x_mean, y_mean, z_mean = (float(part.mean()) for part in (x, y, np.sin(north)))
     longitude = float(np.rad2deg(np.arctan2(y_mean, x_mean)))
     latitude = float(np.rad2deg(np.arctan2(z_mean, np.hypot(x_mean, y_mean))))
-    farthest = float(
-        np.rad2deg(_angles(places, np.array([[longitude]]), np.array([[latitude]])).max())
-    )
+    farthest = float(great_circle(longitude, latitude, *places[:2]).max())
     # Wider by a thousandth for the rounding of numbers in a query
-    radius = farthest + (places.radius + reach) / METRES_PER_DEGREE
+    radius = (farthest + places.radius + reach) / METRES_PER_DEGREE
     return Circle(longitude, latitude, min(radius * 1.001, 180.0))
 
 

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from per_obspy.errors import CatalogError
-from per_obspy.files import content_hash, file_hash, temporary_folder, writing, written_whole
+from per_obspy.files import (
+    content_hash,
+    file_hash,
+    sync_folder,
+    temporary_folder,
+    writing,
+    written_whole,
+)
 from per_obspy.inventory.files.text_cells import cell
 from per_obspy.names import inside
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
@@ -220,10 +227,11 @@ def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[
         write_changes(before, made, facts)
         outputs[CHANGES] = file_hash(made / CHANGES)
         write_status(made / REVISION, content_of(record, outputs["event.xml"]), outputs, facts, 1)
-        _sync_folders(made)
+        for parent, _, _ in os.walk(made):
+            sync_folder(Path(parent))
         with writing(target):
             made.rename(target)
-            _sync_folders(target.parent)
+        sync_folder(target.parent)
     point_latest(event)
     return target
 
@@ -270,19 +278,6 @@ def _linked(earlier: Path, target: Path, digest: str) -> bool:
     except OSError:  # a file system without links, or one file with too many
         return False
     return True
-
-
-def _sync_folders(folder: Path) -> None:
-    """Wait until the names in a folder and in those below it are on the disk."""
-    if os.name != "posix":
-        return
-    for parent, _, _ in os.walk(folder):
-        # As files.written_whole does for one file
-        handle = os.open(parent, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def point_latest(event: Path) -> None:

@@ -20,6 +20,7 @@ def test_from_files_on_a_desk_to_a_table(tmp_path, monkeypatch, call):
         "records: records (records, found here)",
         "pairs: pairs.csv (pair table, found here)",
         "run.toml is written; next: per-obspy run run.toml",
+        "then open, in this order: report.html, risk.csv, rejected.csv in results",
     ]
     small = ["--set", "spectra.count=5", "--set", "screening.exact=false"]
     small += ["--set", "screening.largest_distance=1e5", "--set", "workers=1"]

@@ -29,7 +29,14 @@ def test_records_and_pairs_are_a_run(records, tmp_path, monkeypatch, call):
     line = f"records: {records} (folder); pairs: town.csv (pair table); results: {folder}"
     assert err.splitlines()[0] == line.replace(f"{tmp_path}/", "")
     assert "2 stations, 1 pairs" in out
-    assert f"{folder / 'configuration.toml'}" in out
+    assert f"per-obspy run {folder / 'configuration.toml'} does it again." in out
+    # The last lines are the files to open, which are there
+    assert "Open in this order:" in out.splitlines()[-4]
+    to_open = [line.strip().partition(": ")[0] for line in out.splitlines()[-3:]]
+    assert to_open == [str(folder / name) for name in ("report.html", "risk.csv", "rejected.csv")]
+    assert all((folder / name).is_file() for name in to_open)
+    code, described, _ = call("info", folder)
+    assert "report.html, then risk.csv, then rejected.csv" in described.splitlines()[1]
     # a second run does nothing, also in the other order; another value is another run
     code, out, _ = call("run", "town.csv", records, *OPTIONS, "--json")
     assert (code, json.loads(out)["did_nothing"]) == (0, True)

@@ -5,7 +5,7 @@ import pytest
 from obspy.geodetics import locations2degrees
 
 from per_obspy.config import Pairs, Reach, Records, Run, Watch
-from per_obspy.constants import METRES_PER_DEGREE
+from per_obspy.constants import EARTH_RADIUS, METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
 from per_obspy.watch.relevance import (
     CELL,
@@ -37,7 +37,8 @@ def test_distances_are_those_of_the_sphere(centre):
     places = Places(np.array([centre[0]]), np.array([centre[1]]), 0.0)
     random = np.random.default_rng(1)
     longitude, latitude = random.uniform(-180, 180, 50), random.uniform(-90, 90, 50)
-    expected = locations2degrees(latitude, longitude, centre[1], centre[0]) * METRES_PER_DEGREE
+    degrees = locations2degrees(latitude, longitude, centre[1], centre[0])
+    expected = np.deg2rad(degrees) * EARTH_RADIUS
     # 1 m: both lose digits where places are nearly opposite
     np.testing.assert_allclose(distances(places, longitude, latitude), expected, atol=1.0)
 

@@ -461,6 +461,21 @@ def test_folder_of_quakeml(city, simulation, tmp_path):
     assert city.state("event").reason == "deleted at its source"
 
 
+def test_a_file_with_another_name_is_the_same_earthquake(city, simulation, tmp_path):
+    feed = in_folder(tmp_path / "feed")
+    file = write_event(tmp_path / "feed", "a.xml", simulation.event)
+    city.at(61, **feed)
+    file.rename(file.with_name("b.xml"))
+    city.at(100, **feed)
+    state = city.state("event")
+    assert (state.state, state.file) == ("open", "b.xml")
+    # Its name is no news, and no run; what it says is
+    assert city.revisions("event") == ["0001"]
+    write_event(tmp_path / "feed", "b.xml", magnified(simulation, 7.2))
+    city.at(150, **feed)
+    assert city.revisions("event") == ["0001", "0002"]
+
+
 @pytest.mark.parametrize("listed_by", ["service", "folder"])
 @pytest.mark.parametrize(
     ("event", "reason", "wider"),
