@@ -158,23 +158,31 @@ def _write_section(
 
 def _write_legend(figure: Figure, results: Results, at: float) -> float:
     """Write the number of pairs of each class in its colour, and return the height of the lines."""
-    # Entries as wide as they are drawn, on as many lines as they need between map and margin
     left, line, counts = MAP_LEFT, 0, results.tally.classes
-    entries, colours = list[tuple[Text, Text, int]](), class_colours(results.region.classes)
-    for name in filter(counts.get, colours):
+    entries = list[tuple[Text, Text, int]]()
+    # Entries as wide as they are drawn, on as many lines as they need between map and margin
+    for name, colour in class_colours(results.region.classes).items():
+        if not counts[name]:
+            continue
         words = f"{shortened(class_text(name, results.texts), 24)} {results.written(counts[name])}"
-        text = figure.text(0.0, 0.0, literal(words), size=7.5)
+        mark, text = (figure.text(0.0, 0.0, one, size=7.5) for one in ("●", literal(words)))
+        mark.set(color=colour, size=9)
         width = 0.016 + text.get_window_extent().width / figure.bbox.width
         if left > MAP_LEFT and left + width > RIGHT:
             left, line = MAP_LEFT, line + 1
-        entries.append((figure.text(left, 0.0, "●", size=9, color=colours[name]), text, line))
+        mark.set_x(left)
         text.set_x(left + 0.016)
+        entries.append((mark, text, line))
         left += width + 0.018
-    # The last line is the lowest
-    for mark, text, row in entries:
-        mark.set_y(at + LEGEND_LINE * (line - row))
-        text.set_y(at + LEGEND_LINE * (line - row))
+    _lift(entries, at, line)
     return LEGEND_LINE * line
+
+
+def _lift(entries: Iterable[tuple[Text, Text, int]], at: float, last: int) -> None:
+    """Move the entries of a legend to their lines, of which the last is the lowest."""
+    for mark, text, line in entries:
+        for part in (mark, text):
+            part.set_y(at + LEGEND_LINE * (last - line))
 
 
 def _write_pairs(figure: Figure, results: Results, at: float) -> None:
