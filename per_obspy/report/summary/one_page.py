@@ -158,18 +158,19 @@ def _write_section(
 
 def _write_legend(figure: Figure, results: Results, at: float) -> float:
     """Write the number of pairs of each class in its colour, and return the height of the lines."""
-    left, line, counts = MAP_LEFT, 0, results.tally.classes
-    entries = list[tuple[Text, Text, int]]()
+    left, line, entries = MAP_LEFT, 0, list[tuple[Text, Text, int]]()
+    counts = results.tally.classes
     # Entries as wide as they are drawn, on as many lines as they need between map and margin
     for name, colour in class_colours(results.region.classes).items():
         if not counts[name]:
             continue
-        words = f"{shortened(class_text(name, results.texts), 24)} {results.written(counts[name])}"
-        mark, text = (figure.text(0.0, 0.0, one, size=7.5) for one in ("●", literal(words)))
-        mark.set(color=colour, size=9)
+        label = shortened(class_text(name, results.texts), 24)
+        mark = figure.text(left, 0.0, "●", size=9, color=colour)
+        text = figure.text(0.0, 0.0, literal(f"{label} {results.written(counts[name])}"), size=7.5)
         width = 0.016 + text.get_window_extent().width / figure.bbox.width
         if left > MAP_LEFT and left + width > RIGHT:
             left, line = MAP_LEFT, line + 1
+        # A mark, its words, and room to the next one
         mark.set_x(left)
         text.set_x(left + 0.016)
         entries.append((mark, text, line))
