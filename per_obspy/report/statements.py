@@ -116,7 +116,8 @@ def _alert_sentence(results: Results) -> str:
     percent = results.written(share if share in (0.0, 100.0) else min(share, 99.0))
     if 0.0 < share < 1.0:
         percent = results.texts["alert_under"]
-    whole = {"all": results.written(known), "share": percent}
+    key = "alert_pairs" if results.coverage.pairs == known else "alert_screened"
+    whole = {"all": results.counted(key, known), "share": percent}
     if round(tally.expected) < 1:
         return f"{results.counted('alert_none_hit', known, **whole)}."
     clauses = [results.counted("alert_hit", _rounded(tally.expected), **whole)]
