@@ -332,14 +332,14 @@ def _print_counts(record: dict[str, Any]) -> None:
 
 
 def print_coverage(record: "Mapping[str, Any]") -> None:
-    """Print the alert, and the rows that have a verdict or are left out with their reasons."""
+    """Print the rows that have a verdict, those left out with their reasons, and the alert."""
     from per_obspy.report.coverage import coverage_sentences
     from per_obspy.results.coverage import Coverage
 
-    if record.get("alert"):
-        print(printable(record["alert"]))
     for sentence in coverage_sentences(Coverage.of_record(record)):
         print(printable(sentence))
+    if record.get("alert"):
+        print(printable(record["alert"]))
 
 
 def _print_warnings(warnings: dict[str, list[str]]) -> None:

@@ -27,9 +27,7 @@ def coverage_sentences(coverage: Coverage, language: str = "en") -> list[str]:
     }  # fmt: skip
     values = {name: written(value, 0, language) for name, value in counts.items()}
     if coverage.lacks_many:
-        # 100 only if it is all
-        share = min(round(100 * counts["count"] / coverage.pairs), 99 if coverage.screened else 100)
-        sentences.append(texts["coverage_many"].format(**values, share=share))
+        sentences.append(texts["coverage_many"].format(**values, share=_lost_share(coverage)))
     if coverage.search:
         sentences.append(search_sentence(coverage.search, language))
     # Rows of the table, which are those that the search kept
@@ -40,6 +38,12 @@ def coverage_sentences(coverage: Coverage, language: str = "en") -> list[str]:
     areas = _areas(coverage.areas, language)
     reasons = f"{kind_text(coverage.left_out, language)}{areas}"
     return [*sentences, f"{texts['coverage_some'].format(**values)} ({reasons})."]
+
+
+def _lost_share(coverage: Coverage) -> int:
+    """Return the pairs without a verdict in percent; 100 only if it is all."""
+    share = round(100 * (coverage.pairs - coverage.screened) / coverage.pairs)
+    return min(share, 99 if coverage.screened else 100)
 
 
 def search_sentence(search: Search, language: str) -> str:

@@ -231,25 +231,34 @@ def worst_places(table: pd.DataFrame, region: Region) -> list[tuple[Frame, IntAr
         Frame and positions of the pairs in each place, that of the worst pair first. Places of the
         mildest class alone are none.
     """
-    points = _points(table, region)
+    points, places = _points(table, region), list[tuple[Frame, IntArray]]()
     east, north = points.longitude, points.latitude
     if east.size < FEWEST or _whole_frame(points, region).size < STREETS:
         return []
-    pairs = frame_of(east, north)
-    half = max(SHARE * pairs.size, LEAST) / METRES_PER_DEGREE
     # Pairs that are not yet in a place
     mildest = [region.classes[-1], UNKNOWN_CLASS]
-    rest, places = ~table["risk_class"].isin(mildest).to_numpy(), list[tuple[Frame, IntArray]]()
+    rest = ~table["risk_class"].isin(mildest).to_numpy()
     while rest.any() and len(places) < SHOWN_PLACES:
         worst = int(np.argmax(rest))
-        near = np.abs(east - east[worst]) * pairs.stretch <= half
-        near &= np.abs(north - north[worst]) <= half
+        near = _near(points, worst)
+        # Its place may be unknown
         rest &= ~near
         rest[worst] = False
         members = np.flatnonzero(near).astype(np.int64)
         if members.size >= FEWEST:
             places.append((frame_of(east[members], north[members]).padded(MARGIN), members))
     return places
+
+
+def _near(points: _Points, worst: int) -> NDArray[np.bool_]:
+    """Return which pairs are in the square around one of them."""
+    # A share of the map of all pairs
+    pairs = frame_of(points.longitude, points.latitude)
+    half = max(SHARE * pairs.size, LEAST) / METRES_PER_DEGREE
+    east = np.abs(points.longitude - points.longitude[worst]) * pairs.stretch
+    north = np.abs(points.latitude - points.latitude[worst])
+    near: NDArray[np.bool_] = (east <= half) & (north <= half)
+    return near
 
 
 def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:

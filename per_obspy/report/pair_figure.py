@@ -47,6 +47,7 @@ def differing_pair(worst: pd.DataFrame) -> "pd.Series[Any] | None":
     recorded = worst[worst["station"] != ""]
     if recorded.empty:
         return None
+    # Circles at contact height, as the figure draws them
     one, two = (recorded[f"participation_{i}"] * recorded[f"per_{i}"] for i in (1, 2))
     differ = (one / two - 1.0).abs() > ALIKE
     pair: pd.Series[Any] = (recorded[differ] if differ.any() else recorded).iloc[0]
@@ -69,6 +70,7 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path, note: 
         Why this pair is drawn, below the figure.
     """
     figure = Figure(figsize=(13.0, 5.0), layout="constrained")
+    # Record and spectrum, then the circles
     left, right = np.array(figure.subfigures(1, 2, width_ratios=(2.1, 1.0))).tolist()
     motion, spectrum = left.subplots(1, 2, width_ratios=(1.15, 1.0))
     _draw_motion(motion, station, float(pair["azimuth_used"]))
@@ -163,10 +165,13 @@ def _draw_two_gaps(figure: SubFigure, pair: pd.Series, number_text: str) -> None
     figure.supylabel("velocity / frequency (cm)", fontsize=10)
     handles, labels = needs.get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=2, frameon=False)
-    name = title_name(str(pair["pair_id"]))
-    rank = number(pair, "rank")
-    place = f", rank {rank:.0f}" if np.isfinite(rank) else ""
-    figure.suptitle(f"{number_text}pair {name}{place}", fontsize=11, parse_math=False)
+    figure.suptitle(f"{number_text}{_pair_title(pair)}", fontsize=11, parse_math=False)
+
+
+def _pair_title(pair: pd.Series) -> str:
+    """Return the name of a pair and its rank, if it has one."""
+    rank = f", rank {pair['rank']:.0f}" if "rank" in pair else ""
+    return f"pair {title_name(str(pair['pair_id']))}{rank}"
 
 
 def _draw_circles(axes: Axes, pair: pd.Series, apart: float, widest: float) -> None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from per_obspy.report.tally import PairTally
+from per_obspy.report.texts import counted, texts_of, written
 from per_obspy.results.coverage import Coverage
 
 
@@ -152,3 +153,16 @@ class Results:
     provenance: Sequence[tuple[str, str]] = ()
     own: Sequence[str] = ()
     class_limits: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def texts(self) -> Mapping[str, str]:
+        """Return the texts about results of this kind by their keys."""
+        return texts_of(self.language, self.stem)
+
+    def written(self, value: float, digits: int = 0) -> str:
+        """Return a number as the language writes it."""
+        return written(value, digits, self.language)
+
+    def counted(self, key: str, count: float, **values: str) -> str:
+        """Return a text about a number of things."""
+        return counted(self.language, key, count, self.stem, **values)

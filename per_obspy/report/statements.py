@@ -11,7 +11,7 @@ from per_obspy.errors import shortened
 from per_obspy.report.results import Results, Revision
 from per_obspy.report.style import class_colours
 from per_obspy.report.tally import HARD
-from per_obspy.report.texts import LANGUAGES, counted, fixed_phrases, texts_of, written
+from per_obspy.report.texts import LANGUAGES, counted, fixed_phrases, written
 from per_obspy.report.words import chance_text, name_text, number, speed_text
 
 #: Pairs and buildings that a summary lists.
@@ -63,31 +63,42 @@ class Alert(NamedTuple):
 
 def alert(results: Results) -> Alert:
     """Return the alert of a screening."""
-    texts, tally = texts_of(results.language, results.stem), results.tally
-    colours, classes = class_colours(results.region.classes), results.region.classes
-    # One pair is expected where the probabilities of a class add up to a half or more
-    worst = next((name for name in classes if tally.expected_by_class[name] >= 0.5), None)
-    known = tally.pairs > tally.states["unknown"]
-    key = "alert_level" if known else "alert_level_unknown"
-    if results.coverage.lacks_many and known:
-        key = "alert_level_least"
-    name = class_text(worst, texts) if worst else texts["alert_none"]
-    status = [texts["alert_status" if not tally.yielding else "alert_status_yielding"]]
-    if results.revision.time:
-        status.insert(0, texts["alert_issued"].format(time=shortened(results.revision.time, 20)))
-    limits = results.class_limits.items()
-    bounds = [
-        f"{class_text(name, texts)} ≥ {speed_text(limit, results.language)}"
-        for name, limit in limits
-        if limit > 0.0
-    ]
+    texts, tally, level = results.texts, results.tally, _level(results)
+    is_known = tally.pairs > tally.states["unknown"]
+    # Pairs without a verdict may be worse
+    key = "alert_level_least" if results.coverage.lacks_many else "alert_level"
+    # When and how the results were made, and that nobody has reviewed them
+    time, issued = shortened(results.revision.time, 20), texts["alert_issued"]
+    status = texts["alert_status_yielding" if tally.yielding else "alert_status"]
     return Alert(
-        texts[key].format(name=name),
-        colours[worst] if worst else NO_LEVEL,
-        _alert_sentence(results) if known else texts["alert_unknown"],
-        " ".join(status),
-        texts["alert_levels"].format(limits=", ".join(bounds)) if bounds else "",
+        texts[key if is_known else "alert_level_unknown"].format(
+            name=class_text(level, texts) if level else texts["alert_none"]
+        ),
+        class_colours(results.region.classes)[level] if level else NO_LEVEL,
+        _alert_sentence(results) if is_known else texts["alert_unknown"],
+        f"{issued.format(time=time)} {status}" if time else status,
+        texts["alert_levels"].format(limits=_limits(results)) if results.class_limits else "",
     )
+
+
+def _limits(results: Results) -> str:
+    """Return the smallest impact velocity of each class but the mildest."""
+    return ", ".join(
+        f"{class_text(name, results.texts)} ≥ {speed_text(limit, results.language)}"
+        for name, limit in results.class_limits.items()
+        if limit > 0.0
+    )
+
+
+def _level(results: Results) -> str:
+    """Return the worst class that a pair is expected to reach, empty if none is."""
+    expected = 0.0
+    for name in results.region.classes:
+        expected += results.tally.expected_by_class[name]
+        # Rounded it is one pair of this class or a worse one
+        if expected >= 0.5:
+            return name
+    return ""
 
 
 def alert_line(results: Results) -> str:
@@ -98,23 +109,23 @@ def alert_line(results: Results) -> str:
 
 def _alert_sentence(results: Results) -> str:
     """Return how many pairs hit each other, and how many of them how hard."""
-    tally, stem, language = results.tally, results.stem, results.language
+    tally = results.tally
     known = tally.pairs - tally.states["unknown"]
-    expected = _rounded(tally.expected)
     share = 100.0 * tally.expected / known
     # 100 only if it is all, 0 only if it is none
-    percent = written(share if share in (0.0, 100.0) else min(share, 99.0), 0, language)
+    percent = results.written(share if share in (0.0, 100.0) else min(share, 99.0))
     if 0.0 < share < 1.0:
-        percent = LANGUAGES[language]["alert_under"]
-    whole = {"all": written(known, 0, language), "share": percent}
-    if expected < 1:
-        return f"{counted(language, 'alert_none_hit', known, stem, **whole)}."
-    clauses = [counted(language, "alert_hit", expected, stem, **whole)]
+        percent = results.texts["alert_under"]
+    key = "alert_pairs" if results.coverage.pairs == known else "alert_screened"
+    whole = {"all": results.counted(key, known), "share": percent}
+    if round(tally.expected) < 1:
+        return f"{results.counted('alert_none_hit', known, **whole)}."
+    clauses = [results.counted("alert_hit", _rounded(tally.expected), **whole)]
     # Fewer and fewer of them, until there is none
     for key, count in (("alert_hard", tally.hard), ("alert_columns", tally.columns)):
-        if _rounded(count) < 1:
+        if round(count) < 1:
             break
-        clauses.append(counted(language, key, _rounded(count), stem))
+        clauses.append(results.counted(key, _rounded(count)))
     return f"{'; '.join(clauses)}."
 
 
@@ -130,53 +141,59 @@ def class_text(name: str, texts: Mapping[str, str]) -> str:
 
 def key_numbers(results: Results) -> list[tuple[str, str]]:
     """Return four numbers of a screening, each with its meaning."""
-    tally, stem, language = results.tally, results.stem, results.language
-    texts, worst = texts_of(language, stem), results.worst if len(results.worst) else results.listed
+    tally, texts = results.tally, results.texts
     # From the pairs that surely hit to those that possibly do
-    sure = min(tally.states["yes"], math.floor(tally.expected))
-    possible = sum(tally.states[state] for state in ("yes", "likely", "possible"))
-    ends = written(sure, 0, language), written(max(possible, tally.expected), 0, language)
-    expected, limit = written(_rounded(tally.expected), 0, language), speed_text(HARD, language)
-    numbers = [
-        (f"{expected} ({ends[0]}–{ends[1]})", texts["number_hit"]),
-        (written(_rounded(tally.hard), 0, language), texts["number_hard"].format(limit=limit)),
+    sure, likely, possible = (tally.states[state] for state in ("yes", "likely", "possible"))
+    least = results.written(min(sure, math.floor(tally.expected)))
+    most = results.written(max(sure + likely + possible, tally.expected))
+    hit = f"{results.written(_rounded(tally.expected))} ({least}–{most})"
+    hard = texts["number_hard"].format(limit=speed_text(HARD, results.language))
+    # Buildings are known where rows of buildings were screened
+    count, key = results.buildings_hit, "number_buildings"
+    if count is None:
+        count, key = tally.states["unknown"], "number_unknown"
+    return [
+        (hit, texts["number_hit"]),
+        (results.written(_rounded(tally.hard)), hard),
+        (results.written(count), results.counted(key, count)),
+        (speed_text(_fastest(results), results.language), texts["number_velocity"]),
     ]
-    if results.buildings_hit is not None:
-        hit = results.buildings_hit
-        numbers.append(
-            (written(hit, 0, language), counted(language, "number_buildings", hit, stem))
-        )
-    else:
-        unknown = tally.states["unknown"]
-        numbers.append((written(unknown, 0, language), texts["number_unknown"]))
-    fastest = float(worst["expected_impact_velocity"].max()) if len(worst) else math.nan
-    return [*numbers, (speed_text(fastest, language), texts["number_velocity"])]
+
+
+def _fastest(results: Results) -> float:
+    """Return the largest expected impact velocity, m/s: that of one of the worst pairs."""
+    worst = _worst(results)
+    return float(worst["expected_impact_velocity"].max()) if len(worst) else math.nan
+
+
+def _worst(results: Results) -> pd.DataFrame:
+    """Return the worst pairs, of the page or else of the summary."""
+    return results.worst if len(results.worst) else results.listed
 
 
 def first_steps(results: Results) -> list[str]:
     """Return sentences on what to do first."""
-    language, stem, tally = results.language, results.stem, results.tally
-    texts = texts_of(language, stem)
-    worst = results.worst if len(results.worst) else results.listed
+    texts, worst = results.texts, _worst(results)
     steps = [texts["todo_exercise"]] if results.region.simulated else []
     hit = worst[worst["state"].isin(("yes", "likely"))] if "state" in worst else worst
-    steps += _inspections(hit, results, texts) if len(hit) else [texts["todo_none"]]
+    steps += _inspections(hit, results) if len(hit) else [texts["todo_none"]]
     # Gaps to be measured, and pairs that come later
     for state in ("unknown", "possible"):
-        if tally.states[state]:
-            steps.append(counted(language, f"todo_{state}", tally.states[state], stem))
+        if count := results.tally.states[state]:
+            steps.append(results.counted(f"todo_{state}", count))
     return steps
 
 
-def _inspections(hit: pd.DataFrame, results: Results, texts: Mapping[str, str]) -> list[str]:
+def _inspections(hit: pd.DataFrame, results: Results) -> list[str]:
     """Return sentences on the first buildings or pairs, areas, and the joints of a plan."""
-    areas, buildings, hard = results.areas, results.buildings, _rounded(results.tally.hard)
+    areas, buildings, texts = results.areas, results.buildings, results.texts
     if len(buildings):
         steps = [texts["todo_buildings"].format(names=_names(buildings["building_id"]))]
     else:
         steps = [texts["todo_worst"].format(names=_names(hit["pair_id"]))]
-    if hard >= 1 and results.stem != "risk":
-        steps.append(counted(results.language, "todo_retrofit", hard))
+    # A plan mends joints, an earthquake is over
+    if round(results.tally.hard) >= 1 and results.stem != "risk":
+        steps.append(results.counted("todo_retrofit", _rounded(results.tally.hard)))
     # One area is no choice
     if len(areas) > 1 and "expected_pounding" in areas:
         most = areas.sort_values("expected_pounding", ascending=False)[:3]
@@ -198,27 +215,24 @@ def _names(names: Sequence[object] | pd.Series) -> str:
 
 def sureness(results: Results) -> list[str]:
     """Return sentences on uncertainty."""
-    tally, language, stem = results.tally, results.language, results.stem
-    texts = texts_of(language, stem)
+    tally, texts = results.tally, results.texts
     if not tally.pairs:
         return []
-    counts = {name: written(tally.states[name], 0, language) for name in ("yes", "likely")}
-    counts["possible"] = written(tally.states["possible"], 0, language)
-    said, whole = [texts["sure_states"].format(**counts)], written(tally.pairs, 0, language)
+    # Pairs by state, then those in doubt
+    states = ("yes", "likely", "possible")
+    counts = {name: results.written(tally.states[name]) for name in states}
+    said, whole = [texts["sure_states"].format(**counts)], results.written(tally.pairs)
     for flag, key in DOUBTS.items():
-        if tally.flags[flag]:
-            said.append(counted(language, key, tally.flags[flag], all=whole))
+        if count := tally.flags[flag]:
+            said.append(results.counted(key, count, all=whole))
     # The nearer the records, the surer the motion
-    distance = tally.median_distance()
+    distance = tally.median_distance() / 1000.0
     if math.isfinite(distance):
-        said.append(texts["sure_distance"].format(value=written(distance / 1000.0, 1, language)))
+        said.append(texts["sure_distance"].format(value=results.written(distance, 1)))
     if not tally.yielding:
         said.append(texts["sure_elastic"])
-    return [
-        *said,
-        texts["sure_hard"].format(limit=speed_text(HARD, language)),
-        texts["sure_nature"],
-    ]
+    limit = speed_text(HARD, results.language)
+    return [*said, texts["sure_hard"].format(limit=limit), texts["sure_nature"]]
 
 
 def event_sentences(facts: Mapping[str, Any], language: str = "en") -> list[str]:
@@ -240,18 +254,25 @@ def event_sentences(facts: Mapping[str, Any], language: str = "en") -> list[str]
             day = str(facts[name])[:length].replace("T", " ")
             sentences.append(texts[key].format(time=day))
             break
+    # Size, place and map
     if math.isfinite(size := number(facts, "magnitude")):
         sentences.append(texts["magnitude"].format(value=f"{size:.1f}"))
-    # An epicentre has both coordinates; its depth may be unknown
-    east, north = number(facts, "longitude"), number(facts, "latitude")
-    if math.isfinite(east) and math.isfinite(north):
-        place, depth = place_text(north, east, 3, language), number(facts, "depth") / 1000.0
-        key = "epicentre_depth" if math.isfinite(depth) else "epicentre_at"
-        sentences.append(texts[key].format(place=place, depth=f"{depth:.0f}"))
+    sentences += _epicentre(facts, language)
     if facts.get("map"):
         issue = name_text(facts.get("version") or "?")
         sentences.append(texts["shakemap"].format(name=name_text(facts["map"]), version=issue))
     return sentences
+
+
+def _epicentre(facts: Mapping[str, Any], language: str) -> list[str]:
+    """Return a sentence on the epicentre, which needs both coordinates."""
+    east, north = number(facts, "longitude"), number(facts, "latitude")
+    if not (math.isfinite(east) and math.isfinite(north)):
+        return []
+    # The depth may be unknown
+    place, depth = place_text(north, east, 3, language), number(facts, "depth") / 1000.0
+    key = "epicentre_depth" if math.isfinite(depth) else "epicentre_at"
+    return [LANGUAGES[language][key].format(place=place, depth=f"{depth:.0f}")]
 
 
 def revision_line(revision: Revision, language: str) -> str:

@@ -123,6 +123,7 @@ class PairTally:
 
     def __init__(self, classes: Sequence[str]) -> None:
         """Begin without a pair."""
+        # Sums of probabilities, then counts
         self.pairs = 0
         self.expected = self.hard = self.columns = 0.0
         self.yielding = 0
@@ -162,6 +163,7 @@ class PairTally:
         if "risk_class" in piece:
             sums = chance.groupby(piece["risk_class"].to_numpy(), observed=True).sum()
             self.expected_by_class.update(dict(sums))
+        # Of those that are hit hard, some at columns
         if "expected_impact_velocity" in piece:
             chance = chance[piece["expected_impact_velocity"] >= HARD]
             self.hard += float(chance.sum())

@@ -83,6 +83,7 @@ def _texts(language: str) -> dict[str, str]:
     texts |= {f"flagname_{name}": name.replace("_", " ") for name in FLAGS}
     texts |= {f"rule_{name}": words for name, words in DEMAND_RULES.items()}
     for name in dict.fromkeys(("en", language)):
+        # A further language replaces the texts that it has
         keys = [entry for entry in _entries(name) if "msgctxt" not in entry]
         texts |= {entry["msgid"]: entry["msgstr"] for entry in keys if "msgstr" in entry}
         several = [entry["msgid"] for entry in keys if "msgid_plural" in entry]
@@ -96,7 +97,8 @@ def _texts(language: str) -> dict[str, str]:
 LANGUAGES: Mapping[str, Mapping[str, str]] = {name: _texts(name) for name in _CATALOGUES}
 
 
-def texts_of(language: str, stem: str) -> dict[str, str]:
+@cache
+def texts_of(language: str, stem: str) -> Mapping[str, str]:
     """
     Return the texts about results of a kind.
 

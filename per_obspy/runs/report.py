@@ -116,13 +116,7 @@ def _report_pairs(
     outlines = outlines_beside(
         settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
     )
-    language, revision = settings.report.language, revision_of_run(folder / "run.json")
-    number = settings.report.revision or revision.number
-    results = Results(
-        "risk", region, coverage, language, revision._replace(number=number),
-        event_sentences(known, language), stations=read_stations(folder / "stations.csv"),
-        provenance=_provenance(settings), class_limits=settings.screening.classes,
-    )  # fmt: skip
+    results = _results_of_run(settings, folder, coverage, region, known)
     results, reader = _with_pairs(settings, folder, results, outlines, report)
     # Totals, layers and the comparison with observations need no record
     report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
@@ -150,6 +144,19 @@ def _with_pairs(
             results, reader, table.pieces(), folder, outlines, settings.geopackage, report
         )
         return results, reader
+
+
+def _results_of_run(
+    settings: Run, folder: Path, coverage: Coverage, region: Region, known: Mapping[str, Any]
+) -> Results:
+    """Return the results of a run but for its table of pairs."""
+    language, revision = settings.report.language, revision_of_run(folder / "run.json")
+    number = settings.report.revision or revision.number
+    return Results(
+        "risk", region, coverage, language, revision._replace(number=number),
+        event_sentences(known, language), stations=read_stations(folder / "stations.csv"),
+        provenance=_provenance(settings), class_limits=settings.screening.classes,
+    )  # fmt: skip
 
 
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:

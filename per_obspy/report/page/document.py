@@ -37,7 +37,7 @@ from per_obspy.report.statements import (
 )
 from per_obspy.report.style import BUILDING_COLOURS, UNKNOWN_COLOUR, class_colours
 from per_obspy.report.tally import PairTally
-from per_obspy.report.texts import LANGUAGES, counted, fixed_phrases, texts_of, written
+from per_obspy.report.texts import LANGUAGES, fixed_phrases
 from per_obspy.report.words import missing_gap, prevention_kind
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
@@ -103,26 +103,14 @@ LONGEST_CELL = 300
 
 def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, with descriptions of its tables, and the tables."""
+    texts, tables = results.texts, _tables(results)
     # Sentences first, then whatever the script draws
-    language, revision = results.language, results.revision
-    texts, tables = texts_of(language, results.stem), _tables(results)
     content = {
-        "language": language,
+        "language": results.language,
         "texts": {key: text for key, text in texts.items() if not key.startswith(HIDDEN)},
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
         "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
-        "title": shortened(results.region.title, LONGEST_CELL),
-        "simulated": results.region.simulated,
-        "alert": alert(results)._asdict(),
-        "coverage": _coverage(results),
-        "coverage_bar": _coverage_bar(results, texts),
-        "warns": results.coverage.lacks_many,
-        "event": shortened(" ".join(results.source), LONGEST_SOURCE),
-        "revision": revision_line(revision, language),
-        "expected": " ".join(station_sentences(results.stations, language)),
-        "numbers": key_numbers(results),
-        "first": first_steps(results),
-        "sure": sureness(results),
+        **_sentences(results),
         "states": _states(results.tally, texts),
         "classes": _classes(results, texts),
         "pair_count": results.tally.pairs,
@@ -133,11 +121,25 @@ def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
     return content, tables
 
 
-def _coverage(results: Results) -> list[str]:
-    """Return the coverage in sentences, none where the bar says all of it."""
+def _sentences(results: Results) -> dict[str, Any]:
+    """Return title, alert, coverage, earthquake, numbers, actions and doubts."""
     coverage = results.coverage
+    # The bar says all of a table that is screened wholly
     is_whole = coverage.pairs == coverage.screened and not coverage.search
-    return [] if is_whole else coverage_sentences(coverage, results.language)
+    return {
+        "title": shortened(results.region.title, LONGEST_CELL),
+        "simulated": results.region.simulated,
+        "alert": alert(results)._asdict(),
+        "coverage": [] if is_whole else coverage_sentences(coverage, results.language),
+        "coverage_bar": _coverage_bar(results, results.texts),
+        "warns": coverage.lacks_many,
+        "event": shortened(" ".join(results.source), LONGEST_SOURCE),
+        "revision": revision_line(results.revision, results.language),
+        "expected": " ".join(station_sentences(results.stations, results.language)),
+        "numbers": key_numbers(results),
+        "first": first_steps(results),
+        "sure": sureness(results),
+    }
 
 
 def _coverage_bar(results: Results, texts: Mapping[str, str]) -> list[list[Any]]:
@@ -243,9 +245,9 @@ def _further_tables(results: Results, texts: Mapping[str, str]) -> dict[str, Any
     if "expected_pounding" in areas:
         areas = areas.sort_values("expected_pounding", ascending=False)
     if results.rejections:
-        shown = min(results.rejections, MOST_ROWS)
-        shown, count = (written(number, 0, language) for number in (shown, results.rejections))
-        note = counted(language, "rejected_some", results.rejections, shown=shown, all=count)
+        shown = results.written(min(results.rejections, MOST_ROWS))
+        whole = results.written(results.rejections)
+        note = results.counted("rejected_some", results.rejections, shown=shown, all=whole)
     elif results.coverage.pairs > results.coverage.screened:
         # What the search for pairs left out is in no table of this run
         note = " ".join(coverage_sentences(results.coverage, language))
@@ -289,6 +291,7 @@ def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
     if not {"longitude", "latitude"} <= set(stations):
         return []
     placed = stations[stations["longitude"].notna() & stations["latitude"].notna()]
+    # Of an ensemble there may be no peaks
     return [
         [
             shortened(str(row["station"]), 24),

@@ -26,7 +26,6 @@ from per_obspy.report.statements import (
     sureness,
 )
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
-from per_obspy.report.texts import LANGUAGES, counted, texts_of, written
 from per_obspy.report.words import chance_text, length_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
@@ -40,8 +39,8 @@ MAP_LEFT = 0.56
 #: Characters of a line of text of size 9 across half a page, and across the page.
 HALF, WHOLE = 52, 108
 
-#: Characters of the longest sentence on what is left out; summary.txt has all of it.
-LONGEST_ACCOUNT = 300
+#: Characters of the longest sentence of the head; summary.txt has all of it.
+LONGEST_ACCOUNT = 450
 
 #: Colour of the warning that motion is simulated.
 WARNING_COLOUR = "#AA0000"
@@ -68,7 +67,7 @@ def write_page(results: Results, path: Path) -> None:
     at = _write_head(figure, results)
     bottom = at - 0.30
     _draw_map(figure, results, bottom)
-    texts = texts_of(results.language, results.stem)
+    texts = results.texts
     lowest = _write_section(figure, texts["do_first"], first_steps(results), at, HALF)
     lowest = _write_section(figure, texts["how_sure"], sureness(results), lowest, HALF)
     _write_pairs(figure, results, min(lowest, bottom))
@@ -85,10 +84,10 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     """Draw the map of the pairs on the right, with its legend."""
     legend = _write_legend(figure, results, bottom + 0.005)
     box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
-    axes, texts = figure.add_axes(box), LANGUAGES[results.language]
+    axes, texts = figure.add_axes(box), results.texts
     draw_map(axes, results.shown, results.region, around_pairs=True)
     # Labels in the language of the summary
-    axes.set_title(counted(results.language, "map_title", len(results.shown)))
+    axes.set_title(results.counted("map_title", len(results.shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
     axes.tick_params(labelsize=7)
     for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
@@ -102,31 +101,28 @@ def _write_head(figure: Figure, results: Results) -> float:
         figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
         at -= 0.024
     if results.region.simulated:
-        figure.text(
-            LEFT,
-            at,
-            LANGUAGES[results.language]["simulated"],
-            fontsize=12,
-            color=WARNING_COLOUR,
-            fontweight="bold",
-        )
-        at -= 0.024
+        at = _write_lines(figure, [results.texts["simulated"]], at, WARNING_COLOUR, 13.0) - 0.004
     at = _write_alert(figure, alert(results), at)
-    # Whatever has no verdict comes first
-    for place, sentence in enumerate(coverage_sentences(results.coverage, results.language)):
-        warns = place == 0 and results.coverage.lacks_many
-        lines = wrap(shortened(sentence, LONGEST_ACCOUNT), WHOLE)
-        at = _write_lines(figure, lines, at, WARNING_COLOUR if warns else "black")
-    # Sentences one after the other
-    stations = station_sentences(results.stations, results.language)
-    line = revision_line(results.revision, results.language)
-    for text in (line, " ".join(results.source), " ".join(stations)):
-        at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
+    # Whatever has no verdict comes first, then the earthquake
+    # The warning of a table of which much is left out is red
+    account = coverage_sentences(results.coverage, results.language)
+    warning = account[: results.coverage.lacks_many]
+    texts = [
+        *account[len(warning) :],
+        revision_line(results.revision, results.language),
+        " ".join(results.source),
+        *station_sentences(results.stations, results.language),
+    ]
+    for colour, chosen in ((WARNING_COLOUR, warning), ("black", texts)):
+        for text in chosen:
+            lines = wrap(shortened(text, LONGEST_ACCOUNT), WHOLE)
+            at = _write_lines(figure, lines, at, colour)
     return at - 0.01
 
 
 def _write_alert(figure: Figure, alert: Alert, at: float) -> float:
     """Write the alert beside a band of its colour; return how far the page is filled."""
+    # The sentence, its band, and what the level means
     lines, top = wrap(f"{alert.level.upper()}. {alert.sentence}", 72), at + 0.01
     for line in lines:
         figure.text(LEFT + 0.025, at, literal(line), fontsize=11.5, fontweight="bold")
@@ -162,33 +158,37 @@ def _write_section(
 
 def _write_legend(figure: Figure, results: Results, at: float) -> float:
     """Write the number of pairs of each class in its colour, and return the height of the lines."""
+    left, line, entries = MAP_LEFT, 0, list[tuple[Text, Text, int]]()
+    counts = results.tally.classes
     # Entries as wide as they are drawn, on as many lines as they need between map and margin
-    left, line = MAP_LEFT, 0
-    entries = list[tuple[Text, Text, int]]()
     for name, colour in class_colours(results.region.classes).items():
-        if count := results.tally.classes[name]:
-            label = class_text(name, LANGUAGES[results.language])
-            number = written(count, 0, results.language)
-            words = literal(f"{shortened(label, 24)} {number}")
-            text = figure.text(0.0, 0.0, words, fontsize=7.5)
-            width = 0.016 + text.get_window_extent().width / figure.bbox.width
-            if left > MAP_LEFT and left + width > RIGHT:
-                left, line = MAP_LEFT, line + 1
-            entries.append((figure.text(left, 0.0, "●", fontsize=9, color=colour), text, line))
-            text.set_x(left + 0.016)
-            left += width + 0.018
-    # The last line is the lowest
-    for *drawn, row in entries:
-        for text in drawn:
-            text.set_y(at + LEGEND_LINE * (line - row))
+        if not counts[name]:
+            continue
+        label = shortened(class_text(name, results.texts), 24)
+        mark = figure.text(left, 0.0, "●", size=9, color=colour)
+        text = figure.text(0.0, 0.0, literal(f"{label} {results.written(counts[name])}"), size=7.5)
+        width = 0.016 + text.get_window_extent().width / figure.bbox.width
+        if left > MAP_LEFT and left + width > RIGHT:
+            left, line = MAP_LEFT, line + 1
+        # A mark, its words, and room to the next one
+        mark.set_x(left)
+        text.set_x(left + 0.016)
+        entries.append((mark, text, line))
+        left += width + 0.018
+    _lift(entries, at, line)
     return LEGEND_LINE * line
+
+
+def _lift(entries: Iterable[tuple[Text, Text, int]], at: float, last: int) -> None:
+    """Move the entries of a legend to their lines, of which the last is the lowest."""
+    for mark, text, line in entries:
+        for part in (mark, text):
+            part.set_y(at + LEGEND_LINE * (last - line))
 
 
 def _write_pairs(figure: Figure, results: Results, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
-    figure.text(
-        LEFT, at, LANGUAGES[results.language]["worst_pairs"], fontsize=11, fontweight="bold"
-    )
+    figure.text(LEFT, at, results.texts["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
     _write_row(figure, _titles(results), at, MOTION_COLOUR)
     # One per line
@@ -198,7 +198,7 @@ def _write_pairs(figure: Figure, results: Results, at: float) -> None:
         cells = (
             str(position),
             shortened(str(pair["pair_id"]), 26),
-            shortened(class_text(str(pair["risk_class"]), LANGUAGES[results.language]), 12),
+            shortened(class_text(str(pair["risk_class"]), results.texts), 12),
             *_number_cells(dict(pair), results.language),
             f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
         )
@@ -210,10 +210,7 @@ def _write_pairs(figure: Figure, results: Results, at: float) -> None:
 def _titles(results: Results) -> list[str]:
     """Return the titles of the columns; an ensemble lacks the needed gap."""
     hidden = set() if "demand" in results.listed else {"needed"}
-    return [
-        LANGUAGES[results.language][f"head_{key}"] if key and key not in hidden else ""
-        for key in COLUMNS
-    ]
+    return [results.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
 
 
 def _number_cells(pair: dict[Hashable, Any], language: str) -> list[str]:
@@ -244,9 +241,7 @@ def _fit(text: Text, room: float) -> None:
 
 def _write_buildings(figure: Figure, results: Results, at: float) -> None:
     """Write the worst buildings in two columns."""
-    figure.text(
-        LEFT, at, LANGUAGES[results.language]["worst_buildings"], fontsize=11, fontweight="bold"
-    )
+    figure.text(LEFT, at, results.texts["worst_buildings"], fontsize=11, fontweight="bold")
     for position, building in enumerate(results.buildings.head(LISTED).to_dict("records")):
         # Five below each other
         left = LEFT if position < 5 else 0.52

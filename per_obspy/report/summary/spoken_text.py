@@ -21,7 +21,7 @@ from per_obspy.report.statements import (
     station_sentences,
     sureness,
 )
-from per_obspy.report.texts import LANGUAGES, texts_of
+from per_obspy.report.texts import LANGUAGES
 
 #: Longest line, characters.
 WIDTH = 72
@@ -65,7 +65,7 @@ def summary_lines(results: Results) -> list[str]:
 
 def _sections(results: Results) -> dict[str, list[str]]:
     """Return the sentences of each section by its title; the first title is empty."""
-    texts, language = texts_of(results.language, results.stem), results.language
+    texts, language = results.texts, results.language
     # Pairs and buildings with their places in the ranking
     worst, hit = (table.head(LISTED).iterrows() for table in (results.listed, results.buildings))
     pairs = [pair_sentence(dict(row), language) for _, row in worst]
@@ -84,7 +84,7 @@ def _sections(results: Results) -> dict[str, list[str]]:
 
 def _head(results: Results) -> list[str]:
     """Return title, alert, coverage, earthquake and stations."""
-    texts, language, revision = LANGUAGES[results.language], results.language, results.revision
+    texts, language, revision = results.texts, results.language, results.revision
     line = revision_line(revision, language)
     # Whatever has no verdict comes before the earthquake, and before the title if it is much
     account = coverage_sentences(results.coverage, language)
