@@ -31,7 +31,7 @@ def outlines_are_learned(pairs: Table) -> BoolArray:
     """Return a mask of pairs with an outline that was learned from images."""
     if "gap_std_source" not in pairs:
         return np.zeros(len(pairs["gap"]), dtype=bool)
-    return np.asarray(pairs["gap_std_source"], dtype=object) == "learned"
+    return np.asarray(np.asarray(pairs["gap_std_source"], dtype=object) == "learned")
 
 
 def elastic_ratios(table: Table) -> dict[str, FloatArray]:

@@ -87,6 +87,7 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     nothing = np.full(demand.shape, np.nan)
+    # no gap of learned outlines is known to be wide enough
     state = pounding_state(values(table, "probability"), screening.states)
     state[outlines_are_learned(table) & (state == STATES[-1])] = STATES[-2]
     return {

@@ -80,7 +80,7 @@ def test_a_missing_extra_is_one_line_that_names_it(call, monkeypatch, footprints
 def test_the_deviation_that_is_assumed_is_said(call, footprints, tmp_path):
     output = tmp_path / "p.parquet"
     _, out, _ = call("pairs", footprints, "-o", output)
-    assert "gaps of outlines drawn: 0.1 m of deviation is assumed" in out
+    assert "assumed by the origin of the outlines: up to 0.1 m" in out
     assert set(read_pairs(output)["gap_std"]) == {0.1}
     _, out, _ = call("pairs", footprints, "-o", output, "--gap-std", "0.3")
     assert "assumed" not in out

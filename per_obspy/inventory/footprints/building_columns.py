@@ -109,37 +109,45 @@ def schema_columns(
     table = _named_columns(cells, source, given or {})
     notes, placeholders = _read_sizes(table)
     is_understood = np.array(notes, dtype=object) == ""
-    is_empty = len(table) > 0 and (_has_no_size(table) & is_understood).all()
+    is_empty = (_has_no_size(table) & is_understood).all() and len(table)
     if is_empty or not set(SIZES) & set(table):
         raise CatalogError(file, _no_size(table, attributes, source))
-    origins = outline_origins(cells, source)
-    if (origins != "drawn").any():
-        table[OUTLINE_SOURCE] = origins
-    if "height" in table and "height" not in (given or {}):
-        of_heights = pd.Series(source.heights, table.index) if source.heights else origins
-        table = _with_height_errors(table, of_heights)
+    table = _with_origins(table, cells, source, given)
     # Missing heights from the classes of the layer
     if source.class_column is not None:
         classes = cells.get(source.class_column, pd.Series("", cells.index))
         table = with_class_heights(table, classes, is_understood)
     # A placeholder of a building without any size is a note
-    for row in np.flatnonzero(_has_no_size(table) & is_understood).tolist():
+    for row in np.flatnonzero(_has_no_size(table) & is_understood):
         notes[row] = placeholders.get(row, "")
     if any(notes):
         table[NOTES] = notes
     return table.join(cells[[name for name in source.carried if name in cells]])
 
 
-def _with_height_errors(table: pd.DataFrame, origins: pd.Series) -> pd.DataFrame:
-    """Return a table with the deviation of heights that were learned from images."""
-    errors = origins.map({name: origin.height_std for name, origin in ORIGINS.items()})
+def _with_origins(
+    table: pd.DataFrame,
+    cells: pd.DataFrame,
+    source: Source,
+    given: Mapping[str, pd.Series] | None,
+) -> pd.DataFrame:
+    """Return a table with the origin of outlines, and the deviation of heights from images."""
+    # Columns have no origin where all are drawn
+    origins = outline_origins(cells, source)
+    if (origins != "drawn").any():
+        table = table.assign(**{OUTLINE_SOURCE: origins})
+    if "height" not in table or (given and "height" in given):
+        return table
+    # A lognormal height of that deviation in m
+    of_heights = pd.Series(source.heights, table.index) if source.heights else origins
+    errors = of_heights.map({name: origin.height_std for name, origin in ORIGINS.items()})
     learned = (errors > 0.0) & (table["height"] > 0.0)
     if not learned.any():
         return table
-    highest = COLUMNS["height_log_std_1"].high
-    deviation = np.sqrt(np.log1p((errors / table["height"]) ** 2)).clip(upper=highest)
-    given = table.get("height_log_std", pd.Series(np.nan, table.index))
-    return table.assign(height_log_std=given.mask(learned & given.isna(), deviation))
+    deviation = np.sqrt(np.log1p((errors / table["height"]) ** 2))
+    deviation = np.minimum(deviation, COLUMNS["height_log_std_1"].high)
+    known = table.get("height_log_std", pd.Series(np.nan, table.index))
+    return table.assign(height_log_std=known.mask(learned & known.isna(), deviation))
 
 
 def _named_columns(

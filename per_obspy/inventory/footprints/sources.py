@@ -78,6 +78,7 @@ def sources() -> tuple[Source, ...]:
     for entry in table["source"]:
         systems = entry.pop("systems", {})
         by_code = {code: system for system, codes in systems.items() for code in codes}
+        # Without words of a source its column has the names of the origins themselves
         origins = entry.pop("origins", {name: [name] for name in ORIGINS})
         by_word = {word: origin for origin, words in origins.items() for word in words}
         read.append(Source(**entry, systems=by_code, origins=by_word))
@@ -90,6 +91,7 @@ def outline_origins(cells: pd.DataFrame, source: Source) -> pd.Series:
         return pd.Series(source.outlines, cells.index)
     texts = cells[source.origin_column].fillna("").astype(str).str.lower()
 
+    # The first word of a cell decides: Overture's first dataset is that of the outline
     def origin(text: str) -> str:
         words = [word for word in source.origins if word in text]
         return source.origins[min(words, key=text.find)] if words else source.outlines
