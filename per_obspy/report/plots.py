@@ -78,7 +78,7 @@ def plot_spectra(spectra: xr.Dataset, damping: float = 0.05, axes: Axes | None =
 
 
 def _curves(spectra: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
-    """Yield the label and the values of each curve of spectra at one damping, m, NaN if unusable."""
+    """Yield label and values of each curve of spectra at one damping, m; NaN if unusable."""
     usable = spectra["usable"] == 1
     if "station" in spectra.dims:
         for name in spectra["station"].values:
