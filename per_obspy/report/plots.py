@@ -79,6 +79,7 @@ def plot_spectra(spectra: xr.Dataset, damping: float = 0.05, axes: Axes | None =
 
 def _curves(spectra: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
     """Yield label and values of each curve of spectra at one damping, m; NaN if unusable."""
+    # Of several stations one curve each
     usable = spectra["usable"] == 1
     if "station" in spectra.dims:
         for name in spectra["station"].values:
