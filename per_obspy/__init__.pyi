@@ -49,9 +49,9 @@ from .records.sources import read_records as read_records
 from .report.plots import plot_pair as plot_pair
 from .report.plots import plot_risk as plot_risk
 from .report.plots import plot_spectra as plot_spectra
+from .runs.in_memory import screen as screen
 from .runs.run import run as run
 from .screening.risk import risk_table as risk_table
-from .screening.screen import screen as screen
 from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum
 from .spectra.azimuthal import rotd as rotd
 from .spectra.bilinear import bilinear_response as bilinear_response

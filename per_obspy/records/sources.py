@@ -194,6 +194,7 @@ def read_records(*paths: str | Path) -> Stream:
     """
     sources = find_path_sources([Path(path) for path in paths])
     stream, rejected = Stream(), [*sources.rejected]
+    # Station by station, as a run reads them
     for name, station in sources.stations.items():
         traces, unread = station.reader(station.files, station.inventory, name)
         stream += traces

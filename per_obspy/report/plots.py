@@ -4,6 +4,9 @@ Figures on matplotlib axes, for scripts and notebooks: spectra, one pair, a tabl
 Each function draws on the given axes, or on those of a new figure of pyplot, and returns them.
 """
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -13,7 +16,6 @@ from matplotlib.patches import Circle
 from per_obspy.config import Screening
 from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, class_colours, literal
 from per_obspy.report.words import number
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 #: End of the title of a figure of simulated ground motion.
 SIMULATED = "\nSIMULATED ground motion"
@@ -60,29 +62,35 @@ def plot_spectra(spectra: xr.Dataset, damping: float = 0.05, axes: Axes | None =
         raise TypeError(f"spectra must be a Dataset, got {type(spectra).__name__}")
     if not {"per", "per_rotd50"} & set(spectra):
         raise ValueError("spectra must have the variable per or per_rotd50, as of station_spectra")
-    axes = _new_axes() if axes is None else axes
+    axes = axes or _new_axes()
     chosen = spectra.sel(damping=damping, method="nearest")
-    usable = chosen["usable"] == 1
-    if "station" in chosen.dims:
-        radius = chosen["per_rotd50"].where(usable)
-        curves = [(name, "-", radius.sel(station=name)) for name in chosen["station"].values]
-    else:
-        curves = [
-            (f"{channel} {name.upper()}", line, chosen[name].where(usable).isel(component=index))
-            for index, channel in enumerate(chosen["channel"].values)
-            for name, line in (("per", "-"), ("sd", "--"))
-        ]
-    for label, line, curve in curves:
-        axes.loglog(chosen["period"], curve, line, label=literal(str(label)))
+    # Unusable periods are NaN, which breaks the lines
+    for label, curve in _curves(chosen):
+        line = "--" if label.endswith("SD") else "-"
+        axes.loglog(chosen["period"], curve, line, label=literal(label))
     axes.set(xlabel="natural period (s)", ylabel="radius, displacement (m)")
-    is_simulated = str(spectra.attrs.get("simulated", "")) == "true"
-    axes.set_title(f"damping {float(chosen['damping']):.0%}{SIMULATED * is_simulated}")
+    # What is simulated says so
+    note = SIMULATED * (spectra.attrs.get("simulated") == "true")
+    axes.set_title(f"damping {float(chosen['damping']):.0%}{note}")
     axes.grid(which="both", alpha=0.25)
     axes.legend()
     return axes
 
 
-def plot_pair(pair: "pd.Series[object]", axes: Axes | None = None) -> Axes:
+def _curves(spectra: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
+    """Yield label and values of each curve of spectra at one damping, m; NaN if unusable."""
+    # Of several stations one curve each
+    usable = spectra["usable"] == 1
+    if "station" in spectra.dims:
+        for name in spectra["station"].values:
+            yield str(name), spectra["per_rotd50"].where(usable).sel(station=name)
+        return
+    for index, channel in enumerate(spectra["channel"].values):
+        for name in ("per", "sd"):
+            yield f"{channel} {name.upper()}", spectra[name].where(usable).isel(component=index)
+
+
+def plot_pair(pair: "pd.Series[Any]", axes: Axes | None = None) -> Axes:
     """
     Plot the largest energy circles of both buildings of a pair, as far apart as the buildings are.
 
@@ -119,35 +127,44 @@ def plot_pair(pair: "pd.Series[object]", axes: Axes | None = None) -> Axes:
     """
     if not isinstance(pair, pd.Series):
         raise TypeError(f"pair must be a row of a risk table, got {type(pair).__name__}")
-    # SD where no record gives PER
-    radii = list[float]()
-    for i in (1, 2):
-        per, sd = number(pair, f"per_{i}"), number(pair, f"sd_{i}")
-        radii.append(number(pair, f"participation_{i}") * (per if np.isfinite(per) else sd))
+    radii = [_radius(pair, i) for i in (1, 2)]
     gap, needed = number(pair, "gap"), number(pair, "demand")
     if not np.isfinite([*radii, needed]).all():
-        raise ValueError(
-            "pair must have demand, participation_1 and _2, per_1 and _2 or sd_1 and _2"
-        )
-    axes = _new_axes() if axes is None else axes
-    centres = (0.0, needed if np.isnan(gap) else gap)
-    for i, (centre, radius, colour) in enumerate(
-        zip(centres, radii, BUILDING_COLOURS, strict=True), start=1
-    ):
-        label = f"building {i}"
-        circle = Circle((centre, 0.0), radius, facecolor=(colour, 0.18), edgecolor=colour)
-        circle.set_label(label)
-        axes.add_patch(circle)
-        axes.axvline(centre, color=colour, linewidth=0.8)
+        raise ValueError("pair must have demand, and participation and per or sd of both buildings")
+    # Circles and faces, and where the second face would have to be
+    axes = axes or _new_axes()
+    _draw_circles(axes, radii, needed if np.isnan(gap) else gap)
     axes.axvline(needed, color="#444444", linestyle=":", label=f"gap needed, {needed:.3g} m")
-    known = "gap unknown" if np.isnan(gap) else f"gap {gap:.3g} m"
-    note = SIMULATED * ("simulated" in str(pair.get("flags", "")).split())
-    axes.set_title(f"{literal(str(pair.get('pair_id', 'pair')))[:80]}: {known}{note}")
+    axes.set_title(_title(pair))
+    # Both directions in the same length
     axes.set(xlabel="displacement at contact height (m)", ylabel="velocity / frequency (m)")
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     axes.legend(loc="upper right")
     return axes
+
+
+def _title(pair: "pd.Series[Any]") -> str:
+    """Return the name and the gap of a pair, and whether its motion is simulated."""
+    gap, name = number(pair, "gap"), literal(str(pair.get("pair_id", "pair")))[:80]
+    known = "gap unknown" if np.isnan(gap) else f"gap {gap:.3g} m"
+    return f"{name}: {known}{_note(str(pair.get('flags', '')))}"
+
+
+def _radius(pair: "pd.Series[Any]", i: int) -> float:
+    """Return the PER of building i at contact height, or its SD where no record gives PER, m."""
+    per, sd = number(pair, f"per_{i}"), number(pair, f"sd_{i}")
+    return number(pair, f"participation_{i}") * (per if np.isfinite(per) else sd)
+
+
+def _draw_circles(axes: Axes, radii: Sequence[float], apart: float) -> None:
+    """Draw a circle of each building, m, and its face at rest; centres are so far apart, m."""
+    for i, (centre, radius) in enumerate(zip((0.0, apart), radii, strict=True)):
+        colour = BUILDING_COLOURS[i]
+        circle = Circle((centre, 0.0), radius, facecolor=(colour, 0.18), edgecolor=colour)
+        circle.set_label(f"building {i + 1}")
+        axes.add_patch(circle)
+        axes.axvline(centre, color=colour, linewidth=0.8)
 
 
 def plot_risk(table: pd.DataFrame, axes: Axes | None = None) -> Axes:
@@ -187,32 +204,40 @@ def plot_risk(table: pd.DataFrame, axes: Axes | None = None) -> Axes:
         raise TypeError(f"table must be a DataFrame, got {type(table).__name__}")
     if absent := {"longitude", "latitude", "risk_class"} - set(table):
         raise ValueError(f"table must have the columns {', '.join(sorted(absent))}")
-    axes = _new_axes() if axes is None else axes
-    known = [name for name in Screening().classes if (table["risk_class"] == name).any()]
-    others = [name for name in table["risk_class"].unique() if name not in known]
-    colours = class_colours(list(Screening().classes))
-    # Worst classes first in the legend, last on the map
-    names = [*known, *sorted(others, key=lambda name: name == UNKNOWN_CLASS)]
-    for order, name in enumerate(names):
-        pairs = table[table["risk_class"] == name]
-        axes.scatter(
-            pairs["longitude"],
-            pairs["latitude"],
-            s=16,
-            color=colours.get(name, FAINT_COLOUR),
-            label=f"{literal(str(name))}: {len(pairs)}",
-            zorder=3.0 - order / 100.0,
-        )
-    flags = table["flags"].astype(str) if "flags" in table else pd.Series(dtype=str)
-    note = SIMULATED * bool(flags.str.contains(r"\bsimulated\b").any())
+    axes = axes or _new_axes()
+    _draw_classes(axes, table)
+    # Flags of all pairs
+    note = _note(" ".join(map(str, table.get("flags", []))))
     axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)", title=f"{len(table)} pairs{note}")
     # A degree of longitude is shorter by the cosine of the latitude
     middle = float(np.clip(table["latitude"].mean(), -85.0, 85.0)) if len(table) else 0.0
     axes.set_aspect(1.0 / np.cos(np.radians(middle)), adjustable="datalim")
     axes.ticklabel_format(useOffset=False)
-    if names:
+    if len(table):
         axes.legend()
     return axes
+
+
+def _draw_classes(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw the pairs of each risk class at their places, degrees."""
+    colours = class_colours(list(Screening().classes))
+    # Worst classes first in the legend, last on the map
+    groups = {str(name): pairs for name, pairs in table.groupby("risk_class")}
+    names = sorted(groups, key=lambda name: ([*colours, name].index(name), name))
+    for order, name in enumerate(names):
+        axes.scatter(
+            groups[name]["longitude"],
+            groups[name]["latitude"],
+            s=16,
+            color=colours.get(name, FAINT_COLOUR),
+            label=f"{literal(name)}: {len(groups[name])}",
+            zorder=3.0 - order / 100.0,
+        )
+
+
+def _note(flags: str) -> str:
+    """Return the end of a title if flags say that the motion is simulated."""
+    return SIMULATED * ("simulated" in flags.split())
 
 
 def _new_axes() -> Axes:

@@ -38,6 +38,12 @@ PREVENTION_WORDS = {
     "nothing": "Prevention: none needed {motion}.",
 }
 
+#: Reason of class and rank where the exact history has no impact.
+NO_IMPACT = (
+    "The record alone, with the likeliest buildings, closes no gap. Class and rank count every "
+    "outcome of uncertain periods, dampings, gap and motion at the site: {hit} of them hit."
+)
+
 
 def name_text(name: object) -> str:
     """Return a name of data on one line, shortened."""
@@ -166,6 +172,7 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
+    # Why a pair without a verdict has a rank
     if _text(pair, "state") == UNKNOWN_STATE:
         lines.append("It is ranked by the gap that it needs, as if the buildings touched.")
     # A run has one probability, an ensemble perhaps that of a year too
@@ -200,12 +207,10 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
     if math.isfinite(impacts := number(pair, "impacts")):
         fastest = speed_text(number(pair, "impact_velocity_exact"))
         lines.append(f"In this record: {impacts:.0f} impacts, the fastest {fastest}.")
+        # A rank without an impact needs a reason
         if impacts == 0 and expected > 0:
-            lines.append(
-                "The record alone, with the likeliest buildings, closes no gap. Class and rank "
-                "count every outcome of uncertain periods, dampings, gap and motion at the site: "
-                f"{chance_text(number(pair, 'probability'))} of them hit."
-            )
+            hit = chance_text(number(pair, "probability"))
+            lines.append(NO_IMPACT.format(hit=hit))
     if math.isfinite(growth := number(pair, "expected_amplification")):
         lines.append(f"Motion with pounding over motion without: {growth:.2f}.")
     return lines
@@ -224,6 +229,7 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
         }
         # Sentences on known values only
         known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
+        # A name, and the identifier of the inventory
         names = [_text(pair, f"{column}_{i}") for column in ("name", "building_id")]
         name = ", ".join(dict.fromkeys(filter(None, names)))
         if known or name:
@@ -237,6 +243,7 @@ def _place_lines(pair: Mapping[str, Any]) -> list[str]:
     east, north = number(pair, "longitude"), number(pair, "latitude")
     if not (math.isfinite(east) and math.isfinite(north)):
         return []
+    # The nearest town where the inventory names no place
     (place,) = with_towns([_text(pair, "place")], [east], [north])
     at = f"{north:.5f},{east:.5f}"
     osm = f"https://www.openstreetmap.org/?mlat={north:.5f}&mlon={east:.5f}#map=19/{at}"

@@ -135,6 +135,7 @@ def _write_rows(
                 text.write_text(header(short), encoding="utf-8")
             # Rows whose rank is at most the number of rows of the text
             if before < csv_rows:
+                # Columns and digits for a reader
                 worst = piece.select(short).slice(0, csv_rows - before)
                 _append_csv(database, rounded_arrow(worst), text)
             before += piece.num_rows
@@ -225,10 +226,12 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    own, short = DESIGN | {ODD: odd}, table[csv_columns(table)]
+    names, own = list(map(str, table)), DESIGN | {ODD: odd}
+    short = table[csv_columns(names)]
+    # A reader finds a place in every row
     place = with_towns(short["place"], short["longitude"], short["latitude"])
     write_csv(rounded_table(short.assign(place=place), own), text)
     write_parquet(table, whole)
-    write_csv(column_table(map(str, table), own, {}), columns)
+    write_csv(column_table(names, own, {}), columns)
     write_rejected(table.attrs["rejected"], rejected)
     return paths

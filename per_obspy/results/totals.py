@@ -139,15 +139,16 @@ def named_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridC
     east = (boxes[["west", "east"]].mean(axis=1) + 180.0) % 360.0 - 180.0
     north = boxes[["south", "north"]].mean(axis=1).clip(-90.0, 90.0)
     names = near_towns(east, north, size)
-    return GridCells(names[boxes.index.get_indexer(cells.cell)], boxes.set_axis(names))
+    number = boxes.index.get_indexer(pd.Index(cells.cell))
+    return GridCells(names[number], boxes.set_axis(names))
 
 
 def _with_cells(piece: pd.DataFrame, cells: GridCells) -> NDArray[np.object_]:
     """Return the place of each row, or else the name of its cell."""
     if PLACE not in piece:
         return cells.cell
-    place = piece[PLACE].fillna("").astype(str)
-    return np.asarray(place.where(place != "", cells.cell), dtype=object)
+    place = piece[PLACE].fillna("").to_numpy(dtype=object)
+    return np.where(place == "", cells.cell, place)
 
 
 def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.object_]:

@@ -105,9 +105,10 @@ def areas_left_out(totals: Totals, rejected: Sequence[Rejection], rows: RawRows)
     if names:
         lost |= [str(name).strip() in names for name in rows.table[IDENTIFIER].to_pylist()]
     # Cells as they were read, as numbers or as text
+    known = rows.table.column_names
     columns = [f"{name}_{i}" for name in _PLACE for i in (1, 2)]
-    columns += [totals.area] if totals.area else place_columns(rows.table.column_names)
-    chosen = [name for name in dict.fromkeys(columns) if name in rows.table.column_names]
+    columns += [totals.area] if totals.area else place_columns(known)
+    chosen = [name for name in known if name in columns]
     table = rows.table.select(chosen).filter(lost).to_pandas()
     if totals.area is None:
         return Counter(_cells_of(totals, table))

@@ -92,6 +92,7 @@ def code_columns(
     if not asked:
         return pd.DataFrame(index=pairs.index)
     required = required_gaps(pairs, displacement_1, displacement_2, codes)[asked]
+    # A rule that is not met decides, whatever is unknown
     too_small = required.gt(values(pairs, "gap"), axis=0).any(axis=1)
     unknown = required.isna().any(axis=1)
     answer = np.select([too_small, unknown], ["no", "unknown"], "yes").astype(object)

@@ -473,7 +473,7 @@ def column_table(
     names = list(names)
     short = set(csv_columns(names))
     # Columns that the user added to the pair table are not in the schema
-    known, carried = _known() | own, _text("", "carried through from the pair table")
+    known, carried = {**_known(), **own}, _text("", "carried through from the pair table")
     columns = [known.get(name, carried) for name in names]
     table = {
         "name": [*names, *(f"flag_{name}" for name in flags)],

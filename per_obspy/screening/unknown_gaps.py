@@ -72,6 +72,7 @@ def without_gap(table: pd.DataFrame) -> pd.DataFrame:
         table = table.assign(**{SUFFICES.name: table[SUFFICES.name].mask(unknown, "unknown")})
     if not emptied.any():
         return table
+    # Nothing but the demand is known of the others
     numbers = {name: table[name].mask(emptied, np.nan) for name in NUMBERS if name in table}
     texts = {name: table[name].mask(emptied, "") for name in TEXTS if name in table}
     state = table["state"].mask(emptied, UNKNOWN_STATE)

@@ -45,6 +45,7 @@ def test_spectra_are_those_of_the_dataset(axes, station):
     assert usable.any()
     assert_allclose(radius.get_ydata()[usable], at["per"].to_numpy()[usable])
     assert_allclose(displacement.get_ydata()[usable], at["sd"].to_numpy()[usable])
+    assert [line.get_label() for line in axes.get_lines()] == ["HNE PER", "HNE SD"]
     # what the filter took is no line
     assert np.isnan(radius.get_ydata()[~usable]).all()
 

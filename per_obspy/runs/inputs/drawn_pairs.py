@@ -105,7 +105,7 @@ def write_search(found: "FootprintPairs", path: Path) -> "Search":
 
     # What is left out belongs to the cells of a run's totals
     rejected, places = found.pairs.attrs["rejected"], found.left_out
-    areas = list(named_cells(*places.T, Totals().cell).cell) if len(places) else []
+    areas = list(named_cells(places[:, 0], places[:, 1], Totals().cell).cell) if len(places) else []
     search = search_account(len(found.pairs), rejected, areas)
     write_pairs(found.pairs, path, as_metadata(search))
     write_buildings(found.buildings, path.with_suffix(".buildings.parquet"))

@@ -1,10 +1,9 @@
 """Risk table of raw records and a pair table in one call."""
 
-from collections import defaultdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
-from obspy import Stream
 
 from per_obspy.config import Building, Screening
 from per_obspy.inventory.files.reading import read_pairs
@@ -13,9 +12,12 @@ from per_obspy.records.sources import read_records
 from per_obspy.screening.risk import BUILDING, SCREENING, risk_table
 from per_obspy.spectra.station import station_spectra
 
+if TYPE_CHECKING:
+    from obspy import Stream
+
 
 def screen(
-    records: Stream | str | Path,
+    records: "Stream | str | Path",
     pairs: pd.DataFrame | str | Path,
     building: Building = BUILDING,
     screening: Screening = SCREENING,
@@ -47,10 +49,9 @@ def screen(
         If no record is left, with every reason.
     """
     table = pairs if isinstance(pairs, pd.DataFrame) else read_pairs(pairs)
-    stream = records if isinstance(records, Stream) else read_records(records)
+    raw = read_records(records) if isinstance(records, (str, Path)) else records
     # One Dataset per station
-    stations: dict[tuple[str, str], Stream] = defaultdict(Stream)
-    for trace in process(stream):
-        stations[trace.stats.network, trace.stats.station].append(trace)
-    spectra = [station_spectra(traces) for traces in stations.values()]
-    return risk_table(spectra, table, building, screening)
+    stream = process(raw)
+    codes = dict.fromkeys((trace.stats.network, trace.stats.station) for trace in stream)
+    stations = [stream.select(network=network, station=name) for network, name in codes]
+    return risk_table([station_spectra(one) for one in stations], table, building, screening)
