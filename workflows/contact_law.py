@@ -1,5 +1,5 @@
 """
-Measure how far impacts depend on the contact law and the restitution, on real records (5 minutes).
+Measure how far impacts depend on the contact law and the restitution, on real records (10 minutes).
 
     python workflows/contact_law.py
 
@@ -40,10 +40,10 @@ PERIODS = ((0.3, 0.4), (0.5, 0.52), (0.4, 0.8), (0.7, 1.4), (2.0, 1.5))
 MASSES, GAPS, MASS = (1.0, 0.3), (0.01, 0.3), 1e6
 
 #: Damping of buildings, buildings of a row, rows per record, and records of the slow Hertz law.
-DAMPING, ROW, ROWS, HERTZ_RECORDS = 0.05, 5, 4, 4
+DAMPING, ROW, ROWS, HERTZ_RECORDS = 0.05, 5, 4, 1
 
 #: Steps into which a sample is divided, and length of the strongest part of a record, s.
-STEPS, LENGTH = 4, 30.0
+STEPS, LENGTH = 4, 20.0
 
 #: Heading below which the page is the script's.
 MEASURED = "## Contact law"

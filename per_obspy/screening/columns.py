@@ -39,13 +39,23 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "rank",
             "",
-            "order of severity, 1 is the worst: by expected impact velocity, then "
+            "order of severity, 1 is the worst: by weighted_velocity, then "
             "amplification, probability, importance",
         ),
         _text(
             "risk_class",
-            'class of the expected impact velocity by configured thresholds; "gap '
-            'unknown" without a gap',
+            'class of the weighted_velocity by configured thresholds; "gap unknown" without a gap',
+        ),
+        _text(
+            "configuration",
+            "what makes a hit more harmful: floor_to_column, tall_beside_low (two storeys and "
+            "more), light_beside_heavy (twice the mass and more), end_of_row",
+        ),
+        _number(
+            "weighted_velocity",
+            "m/s",
+            "expected_impact_velocity times the factor of the configuration: 2 for floor_to_column,"
+            " else 1.5 for tall_beside_low, else 1; class and rank follow it",
         ),
         _text(
             "state",
@@ -254,7 +264,8 @@ RESULTS: dict[str, Column] = {
 
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
-    "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
+    "rank", "pair_id", "risk_class", "configuration", "state", "probability",
+    "expected_impact_velocity", "weighted_velocity",
     "impact_velocity_84", "expected_amplification", "gap", "demand", "demand_rule", "demand_ratio",
     "impact_velocity", "impacts", "impact_velocity_exact",
     "amplification_exact_1", "amplification_exact_2", "single_hit_status", "amplification_1",
