@@ -22,6 +22,9 @@ from per_obspy.inventory.contact_height import (
     floors_misaligned,
 )
 from per_obspy.inventory.periods import (
+    SOFT_CLASSES,
+    SOFT_GROUND_LOG_STD,
+    SOFT_VS30,
     asce7_period,
     ec8_period,
     period_correlation,
@@ -63,8 +66,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         hazus_yield, yield_displacement, yield_log_std, hardening``; for the pair
         ``period_correlation, longitude, latitude, azimuth, contact_height, floor_offset,
-        floors_misaligned, gap_std, restitution, contact_log_std`` and ``derived``: the names of the
-        derived columns, separated by blanks, empty if none. Units as in the schema.
+        floors_misaligned, soft_ground, gap_std, restitution, contact_log_std`` and ``derived``: the
+        names of the derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
     -----
@@ -113,6 +116,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         **systems,
         derived=joined_names(table.derived),
         floors_misaligned=floors_misaligned(offset, building.floor_tolerance),
+        soft_ground=_soft_ground(pairs),
     )
 
 
@@ -171,6 +175,7 @@ def _add_period(
     known = ~np.isnan(height)
     period = np.where(known, formula(np.where(known, height, 1.0), system), np.nan)
     scatter = period_log_std(system, table.columns[f"height_log_std_{i}"])
+    scatter = np.hypot(scatter, np.where(_soft_ground(table.pairs), SOFT_GROUND_LOG_STD, 0.0))
     # Damping as a fraction of critical
     assumed: dict[str, tuple[FloatArray | float, FloatArray | float]] = {
         "period": (period, scatter),
@@ -180,6 +185,14 @@ def _add_period(
         spread = np.where(np.isnan(table.given(f"{name}_{i}")), deviation, 0.0)
         table.fill(f"{name}_{i}", value)
         table.columns[f"{name}_log_std_{i}"] = table.given(f"{name}_log_std_{i}", spread)
+
+
+def _soft_ground(pairs: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return where the ground is soft by its shear-wave velocity, or by its class without one."""
+    vs30 = numbers_in(pairs, "vs30")
+    site_class = pairs.get("site_class", pd.Series("", index=pairs.index))
+    by_class = site_class.isin(SOFT_CLASSES).to_numpy(bool)
+    return np.where(np.isnan(vs30), by_class, vs30 < SOFT_VS30)
 
 
 def _add_period_correlation(table: _Columns, *systems: pd.Series) -> None:

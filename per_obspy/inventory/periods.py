@@ -45,6 +45,15 @@ ALIKE, ONE_SYSTEM, OTHERS = 0.85, 0.5, 0.2
 ONE_SYSTEM_CHANCE = 0.5
 
 
+#: Softest ground on which buildings stand as if it were rigid, Vs30 in m/s, and site classes below
+#: it: NEHRP E and F.
+SOFT_VS30, SOFT_CLASSES = 180.0, ("E", "F")
+#: Log-standard deviation of a derived period on softer ground, besides that of the formula. Soil
+#: lengthens periods (FEMA 440, NEHRP: some per cent to a third, most of stiff and heavy buildings;
+#: from memory); the number is reasoned. Measured periods have the soil in them.
+SOFT_GROUND_LOG_STD = 0.15
+
+
 def _coefficients(system: ArrayLike) -> NDArray[Any]:
     """Return the five coefficients of structural systems, (5, ...); ValueError if one is none."""
     names = np.asarray(system, dtype=str)

@@ -343,6 +343,9 @@ FLAGS: dict[str, str] = {
     "derived_period": (
         "a period was derived: the demand is at least SRSS; state and rank follow from resampling"
     ),
+    "soft_ground": (
+        "the ground is soft: the soil lengthens periods, by which derived ones are less certain"
+    ),
     "linearized_not_converged": (
         "no ductility up to 40 was found: the linearized demand is that of 40, often too large"
     ),

@@ -346,6 +346,9 @@ SPANISH: dict[str, str] = {
     "flag_derived_period": (
         "un período es derivado: la demanda es al menos SRSS; estado y rango vienen de remuestreo"
     ),
+    "flag_soft_ground": (
+        "el suelo es blando: alarga los períodos, por lo que los derivados son menos seguros"
+    ),
     "flag_linearized_not_converged": (
         "no se halló ductilidad hasta 40: la demanda linealizada es la de 40, a menudo excesiva"
     ),
@@ -445,6 +448,7 @@ SPANISH: dict[str, str] = {
     "flagname_unknown_azimuths": "azimuts desconocidos",
     "flagname_derived_inputs": "datos derivados",
     "flagname_derived_period": "período derivado",
+    "flagname_soft_ground": "suelo blando",
     "flagname_linearized_not_converged": "linealización sin convergencia",
     "flagname_no_damping_suffices": "ningún amortiguamiento basta",
     "flagname_no_bumper_suffices": "ningún tope basta",
