@@ -1,5 +1,5 @@
 """
-Measure how far impacts depend on the contact law and the restitution, on real records (10 minutes).
+Measure how far impacts depend on the contact law and the restitution, on real records (3 minutes).
 
     python workflows/contact_law.py
 
@@ -98,7 +98,7 @@ def pairs_of(
             spring = kelvin_voigt_history(motion, dt, one, two, gap, stiffness, float(dashpot))
             speed = approach_of(spring.displacement, spring.velocity, gap)
             yield f"spring, {stiffness:.2g} N/m", (speed, spring.displacement_maxima), reference
-        if with_hertz and ratio == 1.0:
+        if with_hertz and ratio == 1.0 and share == GAPS[-1]:
             hertz = hertz_damp_history(motion, dt, one, two, gap, HERTZ, REFERENCE)
             speed = approach_of(hertz.displacement, hertz.velocity, gap)
             largest = np.abs(hertz.displacement).max(axis=1)

@@ -143,11 +143,14 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     return np.where(metres <= EC8_HEIGHT, low, asce7_period(metres, system))
 
 
-def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatArray:
+def period_log_std(
+    system: ArrayLike, height_log_std: ArrayLike = 0.0, soft_ground: ArrayLike = False
+) -> FloatArray:
     """
-    Return the logarithmic standard deviation of a derived period: the root of both squares.
+    Return the logarithmic standard deviation of a derived period: the root of the squares.
 
-    That of the height comes with the exponent of ASCE 7; that of Eurocode 8 is not larger.
+    That of the height comes with the exponent of ASCE 7; that of Eurocode 8 is not larger. Soft
+    ground adds its own.
 
     Examples
     --------
@@ -155,7 +158,9 @@ def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatA
     array([0.3  , 0.469])
     """
     *_, exponent, _, scatter = _coefficients(system)
-    return np.asarray(np.hypot(scatter, exponent * np.asarray(height_log_std)))
+    by_height = np.hypot(scatter, exponent * np.asarray(height_log_std))
+    by_ground = np.where(soft_ground, SOFT_GROUND_LOG_STD, 0.0)
+    return np.asarray(np.hypot(by_height, by_ground))
 
 
 def period_correlation(

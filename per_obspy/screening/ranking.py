@@ -122,6 +122,7 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
 def configurations(table: pd.DataFrame) -> dict[str, BoolArray]:
     """Return a mask of rows per configuration of ``CONFIGURATIONS``."""
     (storeys_1, storeys_2), (mass_1, mass_2) = both(table, "storeys"), both(table, "mass")
+    # of the pair, or of either building
     ends = np.zeros(len(table), dtype=bool)
     for name in ("position", "position_1", "position_2"):
         if name in table:

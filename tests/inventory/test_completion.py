@@ -95,7 +95,7 @@ def test_soft_ground_makes_derived_periods_less_certain():
         {"vs30": 180.0, "site_class": "E"},
         {"vs30": np.nan, "site_class": "E"},
     ]
-    rows += [{"vs30": np.nan, "site_class": "D"}, {"vs30": 100.0, "period_1": 0.5}]
+    rows += [{"site_class": "D"}, {"vs30": 100.0, "period_1": 0.5}]
     table = pd.DataFrame([PLACE | SIZES | row for row in rows]).fillna({"site_class": ""})
     complete = completed_pairs(table, Building())
     # a Vs30 before a class
