@@ -96,7 +96,7 @@ BUILDINGS: tuple[Column, ...] = (
     _number(
         "severity",
         "m/s",
-        "largest over the pairs of the building of expected_impact_velocity plus "
+        "largest over the pairs of the building of weighted_velocity plus "
         "the increase of the impact velocity in the exact history of the row",
     ),
     _text("risk_class", "class of the severity, by the names and thresholds of the pairs"),

@@ -21,7 +21,7 @@ from per_obspy.screening.values import values
 
 #: Columns of the risk table that a side of a building needs, besides those of its interface.
 OF_PAIRS = (
-    "rank", "state", "probability", "expected_impact_velocity", "missing_gap",
+    "rank", "state", "probability", "weighted_velocity", "missing_gap",
     "supplemental_damping", "bumper_restitution", "floors_misaligned",
     *(f"{name}_{i}" for name in ("longitude", "latitude", "importance", "occupants")
       for i in (1, 2)),
@@ -141,11 +141,11 @@ def building_table(table: pd.DataFrame, classes: Mapping[str, float], angle: flo
 
 
 def _severity(sides: Sides) -> FloatArray:
-    """Return the expected impact velocity of the pair, increased by the effect of the row, m/s."""
+    """Return the weighted impact velocity of the pair, increased by the effect of the row, m/s."""
     added = sides["impact_velocity"] - sides["impact_velocity_alone"]
     # A row that softens a hit once does not so in the next earthquake
     more: FloatArray = np.nan_to_num(np.maximum(added, 0.0))
-    return sides["expected_impact_velocity"] + more
+    return sides["weighted_velocity"] + more
 
 
 def _classes(severity: FloatArray, classes: Mapping[str, float]) -> NDArray[np.object_]:

@@ -1,6 +1,7 @@
 """``per-obspy events`` and ``fetch``: list earthquakes and fetch their records."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 

@@ -22,6 +22,8 @@ from per_obspy.inventory.contact_height import (
     floors_misaligned,
 )
 from per_obspy.inventory.periods import (
+    SOFT_CLASSES,
+    SOFT_VS30,
     asce7_period,
     ec8_period,
     period_correlation,
@@ -64,9 +66,9 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         hazus_yield, yield_displacement, yield_log_std, hardening``; for the pair
         ``period_correlation, longitude, latitude, azimuth, contact_height, floor_offset,
-        floors_misaligned, gap_std, restitution, contact_log_std``, ``place`` and names of buildings
-        by :func:`~per_obspy.inventory.places.place_names`, and ``derived``: the names of the
-        derived columns, separated by blanks, empty if none. Units as in the schema.
+        floors_misaligned, soft_ground, gap_std, restitution, contact_log_std``, ``place`` and names
+        of buildings by :func:`~per_obspy.inventory.places.place_names`, and ``derived``: the names
+        of the derived columns, separated by blanks, empty if none. Units as in the schema.
 
     Notes
     -----
@@ -91,12 +93,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
       correlation.
     """
     table = _Columns(pairs)
-    # Masonry and anything unknown
-    systems = {}
-    for i in (1, 2):
-        given = pairs.get(f"system_{i}", pd.Series("", index=pairs.index))
-        table.derived[f"system_{i}"] = (given == "").to_numpy(dtype=bool)
-        systems[f"system_{i}"] = given.where(given != "", "other")
+    # Masonry and anything unknown are one system
+    systems = {f"system_{i}": _system(table, i) for i in (1, 2)}
     # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
         _add_size(table, i, building)
@@ -104,7 +102,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         _add_period(table, i, building, system)
         _add_strength(table, i, building, system)
     _add_period_correlation(table, *systems.values())
-    _add_contact(table, building)
+    _add_contact(table)
+    _add_impact(table, building)
     _add_gap(table, building)
     for i in (1, 2):
         _add_mass(table, i, building)
@@ -116,6 +115,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
         **systems,
         derived=joined_names(table.derived),
         floors_misaligned=floors_misaligned(offset, building.floor_tolerance),
+        soft_ground=_soft_ground(pairs),
     )
 
 
@@ -153,6 +153,14 @@ class _Columns:
         return np.where(np.isnan(self.columns[f"height_{i}"]), np.nan, self.columns[f"storeys_{i}"])
 
 
+def _system(table: _Columns, i: int) -> pd.Series:
+    """Return the structural system of building i: other for masonry and anything unknown."""
+    name, unknown = f"system_{i}", pd.Series("", index=table.pairs.index)
+    given = table.pairs.get(name, unknown)
+    table.derived[name] = (given == "").to_numpy(dtype=bool)
+    return given.where(given != "", "other")
+
+
 def _add_size(table: _Columns, i: int, building: config.Building) -> None:
     """Add height, m, and storeys of building i, each from the other by the storey height."""
     counted = np.maximum(np.rint(table.given(f"height_{i}") / building.storey_height), 1.0)
@@ -173,7 +181,8 @@ def _add_period(
     height, formula = table.columns[f"height_{i}"], _FORMULAS[building.period_formula]
     known = ~np.isnan(height)
     period = np.where(known, formula(np.where(known, height, 1.0), system), np.nan)
-    scatter = period_log_std(system, table.columns[f"height_log_std_{i}"])
+    spread = table.columns[f"height_log_std_{i}"]
+    scatter = period_log_std(system, spread, _soft_ground(table.pairs))
     # Damping as a fraction of critical
     assumed: dict[str, tuple[FloatArray | float, FloatArray | float]] = {
         "period": (period, scatter),
@@ -183,6 +192,14 @@ def _add_period(
         spread = np.where(np.isnan(table.given(f"{name}_{i}")), deviation, 0.0)
         table.fill(f"{name}_{i}", value)
         table.columns[f"{name}_log_std_{i}"] = table.given(f"{name}_log_std_{i}", spread)
+
+
+def _soft_ground(pairs: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return where the ground is soft by its shear-wave velocity, or by its class without one."""
+    vs30 = numbers_in(pairs, "vs30")
+    site_class = pairs.get("site_class", pd.Series("", index=pairs.index))
+    by_class = site_class.isin(SOFT_CLASSES).to_numpy(bool)
+    return np.where(np.isnan(vs30), by_class, vs30 < SOFT_VS30)
 
 
 def _add_period_correlation(table: _Columns, *systems: pd.Series) -> None:
@@ -209,22 +226,29 @@ def _add_strength(
     )
     assumed = hazus_yield_displacement(period, system, storeys, building.code_level)
     table.columns[f"hazus_yield_{i}"] = assumed
-    # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
-    share = np.nan_to_num(effective_mass_ratio(storeys), nan=1.0)
-    coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
-    strength = table.given(name, coefficient * (period / 2 / np.pi) ** 2)
+    # Where nothing is given, that of HAZUS if it is asked for
+    strength = _given_strength(table, i)
     is_assumed = np.isnan(strength) & ~np.isnan(assumed) & (building.strength == "hazus")
     strength = table.fill(name, np.where(is_assumed, assumed, strength))
     table.columns[name] = np.where(np.isnan(strength), np.inf, strength)
-    # Deviation and hardening of an assumed strength
+    # Its hardening and deviation
     hardening = np.where(is_assumed, hazus_hardening(system, storeys), 0.0)
     table.columns[f"hardening_{i}"] = table.given(f"hardening_{i}", hardening)
     spread = np.where(is_assumed, CAPACITY_LOG_STD, 0.0)
     table.columns[f"yield_log_std_{i}"] = table.given(f"yield_log_std_{i}", spread)
 
 
-def _add_contact(table: _Columns, building: config.Building) -> None:
-    """Add contact height, participations at it, floor offset and restitution."""
+def _given_strength(table: _Columns, i: int) -> FloatArray:
+    """Return the yield displacement of building i, m, given itself or as a coefficient; or NaN."""
+    # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass causes
+    share = np.nan_to_num(effective_mass_ratio(table.storeys(i)), nan=1.0)
+    coefficient = table.given(f"yield_coefficient_{i}") / share * STANDARD_GRAVITY
+    radius = (table.columns[f"period_{i}"] / 2 / np.pi) ** 2
+    return table.given(f"yield_displacement_{i}", coefficient * radius)
+
+
+def _add_contact(table: _Columns) -> None:
+    """Add contact height, participations at it and floor offset."""
     columns = table.columns
     # Contact at the top of the lower building whose height is known
     lower = np.fmin(columns["height_1"], columns["height_2"])
@@ -241,6 +265,10 @@ def _add_contact(table: _Columns, building: config.Building) -> None:
     sizes = [table.given(f"{name}_{i}") for i in (1, 2) for name in ("height", "storeys")]
     offset = np.where(np.isnan(sizes).any(axis=0), np.nan, floor_offset(*sizes))
     table.fill("floor_offset", offset)
+
+
+def _add_impact(table: _Columns, building: config.Building) -> None:
+    """Add the restitution and the deviation of impact velocities by the contact."""
     table.fill("restitution", building.restitution)
     # A given restitution is that of an instant impact
     deviation = np.where(table.derived["restitution"], CONTACT_LOG_STD, 0.0)

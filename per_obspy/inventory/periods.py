@@ -45,6 +45,15 @@ ALIKE, ONE_SYSTEM, OTHERS = 0.85, 0.5, 0.2
 ONE_SYSTEM_CHANCE = 0.5
 
 
+#: Softest ground on which buildings stand as if it were rigid, Vs30 in m/s, and site classes below
+#: it: NEHRP E and F.
+SOFT_VS30, SOFT_CLASSES = 180.0, ("E", "F")
+#: Log-standard deviation of a derived period on softer ground, besides that of the formula. Soil
+#: lengthens periods (FEMA 440, NEHRP: some per cent to a third, most of stiff and heavy buildings;
+#: from memory); the number is reasoned. Measured periods have the soil in them.
+SOFT_GROUND_LOG_STD = 0.15
+
+
 def _coefficients(system: ArrayLike) -> NDArray[Any]:
     """Return the five coefficients of structural systems, (5, ...); ValueError if one is none."""
     names = np.asarray(system, dtype=str)
@@ -134,11 +143,14 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     return np.where(metres <= EC8_HEIGHT, low, asce7_period(metres, system))
 
 
-def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatArray:
+def period_log_std(
+    system: ArrayLike, height_log_std: ArrayLike = 0.0, soft_ground: ArrayLike = False
+) -> FloatArray:
     """
-    Return the logarithmic standard deviation of a derived period: the root of both squares.
+    Return the logarithmic standard deviation of a derived period: the root of the squares.
 
-    That of the height comes with the exponent of ASCE 7; that of Eurocode 8 is not larger.
+    That of the height comes with the exponent of ASCE 7; that of Eurocode 8 is not larger. Soft
+    ground adds its own.
 
     Examples
     --------
@@ -146,7 +158,9 @@ def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatA
     array([0.3  , 0.469])
     """
     *_, exponent, _, scatter = _coefficients(system)
-    return np.asarray(np.hypot(scatter, exponent * np.asarray(height_log_std)))
+    by_height = np.hypot(scatter, exponent * np.asarray(height_log_std))
+    by_ground = np.where(soft_ground, SOFT_GROUND_LOG_STD, 0.0)
+    return np.asarray(np.hypot(by_height, by_ground))
 
 
 def period_correlation(

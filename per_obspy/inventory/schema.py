@@ -230,6 +230,7 @@ COMPLETED: dict[str, Column] = {
             "",
             "floors of one building may hit columns of the other: outside the method",
         ),
+        Column("soft_ground", "bool", "", "Vs30 below 180 m/s, or site class E or F without one"),
         Column("derived", "str", "", "columns of this row that were derived or assumed, not given"),
     )
 }  # fmt: skip

@@ -83,6 +83,7 @@ def hazus_hardening(system: ArrayLike, storeys: ArrayLike) -> FloatArray:
 def _of_class(system: ArrayLike, storeys: ArrayLike, quantity: int) -> FloatArray:
     """Return a quantity of ``_CAPACITIES``; NaN where system or storeys are unknown."""
     names, count = np.broadcast_arrays(np.asarray(system, dtype=str), storeys)
+    # Low-, mid- or high-rise
     rise = np.searchsorted([MID_RISE, HIGH_RISE], count, side="right")
     result = np.full(names.shape, np.nan)
     for name, quantities in _CAPACITIES.items():

@@ -40,13 +40,23 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "rank",
             "",
-            "order of severity, 1 is the worst: by expected impact velocity, then amplification, "
+            "order of severity, 1 is the worst: by weighted_velocity, then amplification, "
             "probability, importance; a pair of unknown gap as if its buildings touched",
         ),
         _text(
             "risk_class",
-            'class of the expected impact velocity by configured thresholds; "gap '
-            'unknown" without a gap',
+            'class of the weighted_velocity by configured thresholds; "gap unknown" without a gap',
+        ),
+        _text(
+            "configuration",
+            "what makes a hit more harmful: floor_to_column, tall_beside_low (two storeys and "
+            "more), light_beside_heavy (twice the mass and more), end_of_row",
+        ),
+        _number(
+            "weighted_velocity",
+            "m/s",
+            "expected_impact_velocity times the factor of the configuration: 2 for floor_to_column,"
+            " else 1.5 for tall_beside_low, else 1; class and rank follow it",
         ),
         _text(
             "state",
@@ -256,8 +266,8 @@ RESULTS: dict[str, Column] = {
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
     "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
-    "impact_velocity_84", "expected_amplification", "gap", "demand", "demand_rule", "demand_ratio",
-    "impact_velocity", "impacts", "impact_velocity_exact",
+    "impact_velocity_84", "expected_amplification", "configuration", "weighted_velocity", "gap",
+    "demand", "demand_rule", "demand_ratio", "impact_velocity", "impacts", "impact_velocity_exact",
     "amplification_exact_1", "amplification_exact_2", "single_hit_status", "amplification_1",
     "amplification_2", "flags", "station", "distance", "azimuth_used", "azimuth_rule",
     "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2",
@@ -275,16 +285,17 @@ ORDER = (
 #: were asked for follow.
 CSV_COLUMNS = (
     "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
-    "gap", "demand", "demand_rule", "missing_gap", "supplemental_damping", "bumper_restitution",
+    "configuration", "weighted_velocity", "gap", "demand", "demand_rule", "missing_gap", "supplemental_damping", "bumper_restitution",
     "flags", "place", "name_1", "name_2", "building_id_1", "building_id_2", "longitude",
     "latitude", "station", "distance",
-    "storeys_1", "storeys_2", "system_1", "system_2", "floors_misaligned",
+    "storeys_1", "storeys_2", "system_1", "system_2",
 )  # fmt: skip
 
 #: Columns that depend on the contact law, whose own deviation is 5 to 20 %: texts have two digits.
 BY_CONTACT = frozenset(
     {
         *("expected_impact_velocity", "impact_velocity_84", "expected_amplification"),
+        "weighted_velocity",
         *("impact_velocity", "impact_velocity_exact", "worst_expected_impact_velocity"),
         *(f"amplification{exact}_{i}" for exact in ("", "_exact") for i in (1, 2)),
     }
@@ -362,6 +373,9 @@ FLAGS: dict[str, str] = {
     "derived_inputs": "the row has derived inputs, named in the column derived",
     "derived_period": (
         "a period was derived: the demand is at least SRSS; state and rank follow from resampling"
+    ),
+    "soft_ground": (
+        "the ground is soft: the soil lengthens periods, by which derived ones are less certain"
     ),
     "linearized_not_converged": (
         "no ductility up to 40 was found: the linearized demand is that of 40, often too large"

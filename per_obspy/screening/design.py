@@ -182,6 +182,8 @@ LEADING = (
     "expected_impact_velocity",
     "impact_velocity_84",
     "expected_amplification",
+    "configuration",
+    "weighted_velocity",
     "gap",
     "demand",
     "demand_rule",

@@ -75,6 +75,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": period_is_derived(table),
         "no_demand": values(table, "demand") == 0.0,
+        "soft_ground": np.asarray(table["soft_ground"], dtype=bool),
         "floor_to_column": np.asarray(table["floors_misaligned"], dtype=bool),
     }
 

@@ -87,6 +87,7 @@ LARGEST_DAMPING = 0.99
 def period_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray) -> FloatArray:
     """Return the lognormal period of building i at the nodes, (n_pairs, n_nodes), s."""
     deviate = nodes[None, :, 0]
+    # building 2 shares a part of the deviate of building 1
     if i == 2:
         shared = values(table, "period_correlation")[:, None]
         deviate = shared * deviate + np.sqrt(1.0 - shared**2) * nodes[:, 2]
@@ -106,7 +107,8 @@ def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray
 def building_is_uncertain(pairs: Table) -> BoolArray:
     """Return a mask of pairs in which period, damping or strength has a log-standard deviation."""
     deviations = ("period_log_std", "damping_log_std", "yield_log_std")
-    return np.any([np.maximum(*both(pairs, name)) > 0 for name in deviations], axis=0)
+    uncertain = [np.maximum(*both(pairs, name)) > 0 for name in deviations]
+    return np.asarray(np.any(uncertain, axis=0))
 
 
 def gap_dispersion(pairs: Table) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Order of pairs by expected severity, worst first; names of states and risk classes."""
+"""Order of pairs by severity and configuration, worst first; names of states and classes."""
 
 import numpy as np
 import pandas as pd
@@ -8,8 +8,32 @@ from per_obspy.config import Screening, States
 from per_obspy.config.screening import EVERY_STATE as EVERY_STATE
 from per_obspy.config.screening import STATES as STATES
 from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
+from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.flags import elastic_ratios, outlines_are_learned
-from per_obspy.screening.values import Columns, IndexArray, TextArray, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Columns,
+    IndexArray,
+    TextArray,
+    both,
+    values,
+)
+
+#: Factors of the impact velocity by configuration, for class and rank: what one mode per building
+#: does not see. Floors that hit columns shear them at less than what slabs bear; a low roof hits a
+#: storey of its tall neighbour in midheight. Both are criteria of FEMA P-154 and of the New Zealand
+#: guidelines (from memory); the numbers are reasoned. Light beside heavy and end of row are named
+#: only: masses are in the histories of pairs, ends of rows in those of rows.
+CONFIGURATIONS = {
+    "floor_to_column": 2.0,
+    "tall_beside_low": 1.5,
+    "light_beside_heavy": 1.0,
+    "end_of_row": 1.0,
+}
+
+#: Storeys by which a building is tall beside a low one (FEMA P-154, from memory), and ratio of
+#: masses from which one is heavy (reasoned).
+TALLER, HEAVIER = 2.0, 2.0
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
 KEYS = (
@@ -79,14 +103,17 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     """
     Return gap over demand, elastic over yield displacements, state and risk class of rows.
 
-    Return gap over demand, elastic over yield displacements, state and risk class of rows.
-
-    The population alone decides the last two. The first ratio is 0 for touching pairs and NaN (an
-    empty cell) where the demand is 0. Pairs of outlines that were learned from images are
-    ``unlikely`` where others are a ``no``.
+    The population alone decides the state, with the configuration the class. The first ratio is 0
+    for touching pairs and NaN (an empty cell) where the demand is 0. Pairs of outlines that were
+    learned from images are ``unlikely`` where others are a ``no``.
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     nothing = np.full(demand.shape, np.nan)
+    # the largest factor of the configurations
+    configuration, factor = configurations(table), np.ones(demand.shape)
+    for name, is_present in configuration.items():
+        factor = np.where(is_present, np.maximum(factor, CONFIGURATIONS[name]), factor)
+    velocity = factor * values(table, "expected_impact_velocity")
     # no gap of learned outlines is known to be wide enough
     state = pounding_state(values(table, "probability"), screening.states)
     state[outlines_are_learned(table) & (state == STATES[-1])] = STATES[-2]
@@ -94,7 +121,25 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
         "demand_ratio": np.divide(gap, demand, out=nothing, where=demand > 0),
         **elastic_ratios(table),
         "state": state,
-        "risk_class": risk_class(values(table, "expected_impact_velocity"), screening.classes),
+        "configuration": joined_names(configuration),
+        "weighted_velocity": velocity,
+        "risk_class": risk_class(velocity, screening.classes),
+    }
+
+
+def configurations(table: pd.DataFrame) -> dict[str, BoolArray]:
+    """Return a mask of rows per configuration of ``CONFIGURATIONS``."""
+    (storeys_1, storeys_2), (mass_1, mass_2) = both(table, "storeys"), both(table, "mass")
+    # of the pair, or of either building
+    ends = np.zeros(len(table), dtype=bool)
+    for name in ("position", "position_1", "position_2"):
+        if name in table:
+            ends |= np.asarray(table[name] == "end")
+    return {
+        "floor_to_column": np.asarray(table["floors_misaligned"], dtype=bool),
+        "tall_beside_low": np.abs(storeys_1 - storeys_2) >= TALLER,
+        "light_beside_heavy": np.maximum(mass_1, mass_2) >= HEAVIER * np.minimum(mass_1, mass_2),
+        "end_of_row": ends,
     }
 
 
@@ -111,7 +156,7 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
     """
     Sort pairs with their population, worst first, and add the sort columns ``KEYS``.
 
-    The order is by expected impact velocity, then by expected amplification; ties are broken by
+    The order is by weighted impact velocity, then by expected amplification; ties are broken by
     probability, importance, occupants and at last the name, so that it does not depend on the order
     in which pairs were computed. Pairs without a probability, because their gap is unknown, stand
     beside the others as if their buildings touched: by ``VELOCITY_OF_DEMAND``.
@@ -134,7 +179,7 @@ def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
     """Return the columns ``KEYS``; the worst pair has the smallest numbers."""
     # Negated, for more is worse
     keys = (
-        -np.maximum(_largest(table, "expected_impact_velocity"), _velocity_of_unknown(table)),
+        -np.maximum(_largest(table, "weighted_velocity"), _velocity_of_unknown(table)),
         -_largest(table, "expected_amplification"),
         -_largest(table, "probability"),
         -_largest(table, "importance_1", "importance_2"),

@@ -28,6 +28,7 @@ NUMBERS = (
     "demand_ratio",
     "probability",
     "expected_impact_velocity",
+    "weighted_velocity",
     "impact_velocity_84",
     "expected_amplification",
     "impact_velocity",

@@ -51,7 +51,7 @@ def interfaces(**columns):
             "rank": [2, 3, 1],
             "state": ["yes", "no", "possible"],
             "probability": [0.9, 0.001, 0.2],
-            "expected_impact_velocity": [0.05, 0.0, 0.15],
+            "weighted_velocity": [0.05, 0.0, 0.15],
             "missing_gap": [0.02, 0.0, 0.01],
             "supplemental_damping": [np.nan, 0.0, 0.1],
             "bumper_restitution": [0.4, 1.0, 0.3],
@@ -213,7 +213,7 @@ def test_an_unknown_gap_is_never_taken_for_a_wide_one():
     unknown = {
         "probability": [np.nan, 0.001, np.nan],
         "state": ["unknown", "no", "unknown"],
-        "expected_impact_velocity": [np.nan, 0.0, np.nan],
+        "weighted_velocity": [np.nan, 0.0, np.nan],
         "missing_gap": [np.nan, 0.0, np.nan],
     }
     nothing = {"impact_velocity": np.nan, "impact_velocity_alone": np.nan, "impacts": np.nan}

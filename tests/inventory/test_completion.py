@@ -89,6 +89,21 @@ def test_periods_of_alike_neighbours_are_correlated():
     assert derived == [True, True, True, False, False, True]
 
 
+def test_soft_ground_makes_derived_periods_less_certain():
+    rows = [
+        {"vs30": 179.0},
+        {"vs30": 180.0, "site_class": "E"},
+        {"vs30": np.nan, "site_class": "E"},
+    ]
+    rows += [{"site_class": "D"}, {"vs30": 100.0, "period_1": 0.5}]
+    table = pd.DataFrame([PLACE | SIZES | row for row in rows]).fillna({"site_class": ""})
+    complete = completed_pairs(table, Building())
+    # a Vs30 before a class
+    assert complete["soft_ground"].tolist() == [True, False, True, False, True]
+    expected = [np.hypot(0.4, 0.15), 0.4, np.hypot(0.4, 0.15), 0.4, 0.0]
+    assert_allclose(complete["period_log_std_1"], expected, rtol=1e-14)
+
+
 def test_hazus_gives_a_strength_to_known_systems_without_one():
     rows = [{"system_1": "concrete_mrf"}, {"system_1": ""}, {"yield_coefficient_1": 0.2}]
     given = {"system_1": "concrete_mrf", "system_2": "", "storeys_1": 5.0, "period_1": 0.75}

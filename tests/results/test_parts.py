@@ -29,7 +29,7 @@ def table(count, seed, first=0):
         {
             "pair_id": [f"pair {number}" for number in numbers],
             "probability": draw.choice([0.0, 0.5, 1.0], count),
-            "expected_impact_velocity": draw.choice([0.0, 0.1, np.nan], count),
+            "weighted_velocity": draw.choice([0.0, 0.1, np.nan], count),
             "expected_amplification": draw.choice([1.0, 1.5], count),
         }
     )

@@ -33,7 +33,7 @@ def rows():
         "pair_id": [f'pair "{number}", north' for number in random.permutation(COUNT)],
         "state": random.choice(["yes", "likely", "no"], COUNT),
         "probability": random.uniform(0, 1, COUNT),
-        "expected_impact_velocity": random.choice([0.1, 1e-17 / 3, np.nan], COUNT),
+        "weighted_velocity": random.choice([0.1, 1e-17 / 3, np.nan], COUNT),
         "station": random.choice(["", "XX.S001"], COUNT),
         "impacts": random.choice([0.0, 3.0, np.nan], COUNT),
     }
@@ -98,7 +98,7 @@ def test_text_of_the_worst_rows_does_not_depend_on_pieces(
     path = tmp_path / "risk.parquet"
     # Numbers of five digits, of two by the contact law, by Python's own formatting
     table = pd.read_parquet(path).head(csv_rows)
-    for name, digits in (("probability", 5), ("expected_impact_velocity", 2)):
+    for name, digits in (("probability", 5), ("weighted_velocity", 2)):
         table[name] = [float(f"{value:.{digits - 1}e}") for value in table[name]]
     table["impacts"] = table["impacts"].astype("Int64")
     short = [name for name in CSV_COLUMNS if name in table]

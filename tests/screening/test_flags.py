@@ -22,6 +22,7 @@ PLAIN = {
     "demand_ratio": [1.0, 1.0],
     "derived": ["", ""],
     "floors_misaligned": [False, False],
+    "soft_ground": [False, False],
     "distance": [1e3, 1e3],
     "period_1": [0.5, 0.5],
     "period_2": [2.0, 2.0],
@@ -76,6 +77,7 @@ def _raised(flags):
         ({"derived": "system_1"}, {"derived_inputs"}),
         ({"derived": "mass_2 period_2"}, {"derived_inputs", "derived_period"}),
         ({"floors_misaligned": True}, {"floor_to_column"}),
+        ({"soft_ground": True}, {"soft_ground"}),
         # either building counts, whether the strength of the other is known or not
         ({"elastic_ratio_1": 1.01}, {"beyond_elastic"}),
         ({"elastic_ratio_2": 1.01}, {"beyond_elastic"}),

@@ -12,9 +12,11 @@ from per_obspy.config import Screening, States
 from per_obspy.screening.ranking import (
     KEYS,
     STATES,
+    configurations,
     in_order,
     pounding_state,
     risk_class,
+    state_columns,
     worst_first,
 )
 
@@ -35,7 +37,7 @@ TABLE = pd.DataFrame(
         "pair_id",
         "state",
         "probability",
-        "expected_impact_velocity",
+        "weighted_velocity",
         "expected_amplification",
         "importance_2",
         "occupants_1",
@@ -52,11 +54,11 @@ def test_the_worst_is_first_however_the_pairs_came(order):
 
 
 def test_importance_and_occupants_may_be_unknown_and_a_missing_velocity_is_none():
-    bare = TABLE[["pair_id", "expected_impact_velocity"]].copy()
-    bare.loc[0, "expected_impact_velocity"] = np.nan
+    bare = TABLE[["pair_id", "weighted_velocity"]].copy()
+    bare.loc[0, "weighted_velocity"] = np.nan
     ranked = worst_first(bare)
     assert set(ranked["pair_id"].iloc[-2:]) == {"velocity", "z touching in step"}
-    assert list(bare) == ["pair_id", "expected_impact_velocity"]  # the caller's table is as it was
+    assert list(bare) == ["pair_id", "weighted_velocity"]  # the caller's table is as it was
     assert np.isfinite(in_order(bare)[[*KEYS]].to_numpy()).all()
 
 
@@ -104,3 +106,49 @@ def test_no_gap_between_learned_outlines_is_a_no(station):
     assert flagged.tolist() == [False, True, True]
     # nothing else is changed
     assert table["probability"].iloc[0] == table["probability"].iloc[1]
+
+
+#: Two equal buildings that meet floor to floor, inside of a row.
+PLAIN = {
+    "gap": 0.0, "demand": 0.1, "probability": 1.0, "expected_impact_velocity": 0.15,
+    "storeys_1": 4.0, "storeys_2": 4.0, "mass_1": 1e6, "mass_2": 1e6, "floors_misaligned": False,
+    "position": "inside", "yield_displacement_1": np.inf, "yield_displacement_2": np.inf,
+    "hazus_yield_1": np.nan, "hazus_yield_2": np.nan, "sd_1": 0.1, "sd_2": 0.1,
+}  # fmt: skip
+
+
+def _states(*rows):
+    return pd.DataFrame(state_columns(pd.DataFrame([PLAIN | row for row in rows]), Screening()))
+
+
+def test_configurations_are_named_and_weigh_the_velocity():
+    rows = [
+        {},
+        {"floors_misaligned": True},
+        {"storeys_2": 6.0},
+        {"storeys_2": 5.0, "mass_2": 1.99e6},
+        {"mass_1": 2e6},
+        {"position": "end"},
+        {"floors_misaligned": True, "storeys_1": 1.0, "mass_2": 1e7, "position": "end"},
+    ]
+    table = _states(*rows)
+    every = "floor_to_column tall_beside_low light_beside_heavy end_of_row"
+    assert table["configuration"].tolist() == [
+        "", "floor_to_column", "tall_beside_low", "", "light_beside_heavy", "end_of_row", every
+    ]  # fmt: skip
+    # the largest factor; masses and ends are in the histories already
+    expected = [0.15, 0.3, 0.225, 0.15, 0.15, 0.15, 0.3]
+    np.testing.assert_allclose(table["weighted_velocity"], expected, rtol=1e-14)
+    assert table["risk_class"].tolist() == [
+        "moderate", "high", "high", "moderate", "moderate", "moderate", "high"
+    ]  # fmt: skip
+
+
+def test_a_configuration_without_contact_is_not_raised():
+    table = _states({"floors_misaligned": True, "expected_impact_velocity": 0.0})
+    assert table["risk_class"].tolist() == ["low"]
+
+
+def test_unknown_storeys_and_positions_have_no_configuration():
+    rows = pd.DataFrame([PLAIN | {"storeys_1": np.nan}]).drop(columns="position")
+    assert not any(mask.any() for mask in configurations(rows).values())

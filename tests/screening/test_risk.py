@@ -222,8 +222,8 @@ def test_ties_go_to_importance_then_occupants_then_name(station):
     assert table["pair_id"].tolist() == ["P2", "P1", "P0", "P3"]
 
 
-def test_risk_classes_follow_the_expected_impact_velocity(station):
-    velocity = _table(station, {})["expected_impact_velocity"].iloc[0]
+def test_risk_classes_follow_the_weighted_impact_velocity(station):
+    velocity = _table(station, {})["weighted_velocity"].iloc[0]
     assert velocity > 0.0
     for share, name in ((0.9, "hard"), (1.1, "soft")):
         screening = Screening(classes={"hard": share * velocity, "soft": 0.0})
