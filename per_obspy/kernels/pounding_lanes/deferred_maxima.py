@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from per_obspy.kernels._jit import lean
+from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.pounding_events.motion import LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
@@ -145,7 +145,7 @@ def search_deferred(lanes, place, members, row, i, deferred, record, ground):
     deferred[i, STEP_COUNT] = 0.0
 
 
-@lean
+@inlined
 def raise_maxima_of_tile(lanes, place, members, row, i, deferred, record, ground, step, count):
     """Raise the maxima of building i to the samples of the tile from a step on, and defer it."""
     high = lanes[at(TILE_HIGH, place)]

@@ -199,7 +199,7 @@ def _state_nearby(pair, first, state, rates, share):
     return near, z + angle * share * faster, y + share * (rate + 0.5 * share * second)
 
 
-@lean
+@inlined
 def locate_change(pair, row, i, start, end, change, share):
     """
     Return the time of the only change of stiffness of structure i in a piece, and its state then.
