@@ -29,6 +29,9 @@ OPTIONS: dict[str, Any] = {
     "boundscheck": False,
     # No function pointer for C, which no kernel needs
     "no_cfunc_wrapper": True,
+    # The compiler decides what it merges: without this, all that an `inlined` function calls takes
+    # its option over, and kernels have ten times as much code
+    "forceinline": False,
 }
 
 
@@ -73,7 +76,7 @@ def _compiler(
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
-            kernel = numba.njit(**OPTIONS, **options)(function)
+            kernel = numba.njit(**OPTIONS | options)(function)
             # Without the compiler the kernel is the function itself
             if kernel is function:
                 return function
@@ -83,7 +86,7 @@ def _compiler(
             if NO_FOLDER not in str(error):
                 raise
             _warn_without_cache()
-            kernel = numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+            kernel = numba.njit(**OPTIONS | options | {"cache": False})(function)
         return LinkedFunction(kernel, compiler)
 
     return compiled

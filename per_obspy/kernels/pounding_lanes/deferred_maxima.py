@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from per_obspy.kernels._jit import lean
+from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.pounding_events.motion import LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED
 from per_obspy.kernels.pounding_lanes.lanes import (
     DISPLACEMENT,
@@ -66,7 +66,7 @@ class Record(NamedTuple):
     sizes: NDArray[np.float64]
 
 
-@lean
+@inlined
 def fill_ground(record, step, ground):
     """
     Fill the north and east acceleration at a step and the TILE_STEPS steps after it.
@@ -116,14 +116,14 @@ def write_back(lanes, place, members, row, i):
     write_maxima(lanes, place, row, i)
 
 
-@lean
+@inlined
 def write_maxima(lanes, place, row, i):
     """Copy the maxima of building i from its row to its lane."""
     lanes[at(MAXIMUM_SO_FAR, place)] = row[i, LARGEST_DISPLACEMENT]
     lanes[at(RADIUS_SQUARED_SO_FAR, place)] = row[i, LARGEST_RADIUS_SQUARED]
 
 
-@lean
+@inlined
 def may_hold_maximum(deferred, row, i):
     """Return whether building i has a deferred tile that may exceed its maxima so far."""
     return (deferred[i, STEP_COUNT] > 0.0) & (
@@ -133,19 +133,25 @@ def may_hold_maximum(deferred, row, i):
 
 
 @lean
+def _search(lanes, place, members, row, i, deferred, record, ground):
+    """Search the deferred tile of building i."""
+    # ground motion of the tile, then its maxima
+    fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
+    u = deferred[i, FIRST_DISPLACEMENT]
+    z = deferred[i, FIRST_VELOCITY]
+    search_tile(members, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
+    write_maxima(lanes, place, row, i)
+
+
+@inlined
 def search_deferred(lanes, place, members, row, i, deferred, record, ground):
     """Search the deferred tile of building i if it may hold a maximum; none remains deferred."""
     if may_hold_maximum(deferred, row, i):
-        # ground motion of the tile, then its maxima
-        fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
-        u = deferred[i, FIRST_DISPLACEMENT]
-        z = deferred[i, FIRST_VELOCITY]
-        search_tile(members, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
-        write_maxima(lanes, place, row, i)
+        _search(lanes, place, members, row, i, deferred, record, ground)
     deferred[i, STEP_COUNT] = 0.0
 
 
-@lean
+@inlined
 def raise_maxima_of_tile(lanes, place, members, row, i, deferred, record, ground, step, count):
     """Raise the maxima of building i to the samples of the tile from a step on, and defer it."""
     high = lanes[at(TILE_HIGH, place)]
@@ -155,8 +161,7 @@ def raise_maxima_of_tile(lanes, place, members, row, i, deferred, record, ground
     row[i, LARGEST_RADIUS_SQUARED] = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
     write_maxima(lanes, place, row, i)
     # an earlier tile may still hold more
-    if may_hold_maximum(deferred, row, i):
-        search_deferred(lanes, place, members, row, i, deferred, record, ground)
+    search_deferred(lanes, place, members, row, i, deferred, record, ground)
     # steps and state at the start
     deferred[i, FIRST_STEP] = step
     deferred[i, STEP_COUNT] = count

@@ -12,7 +12,7 @@ step from that start.
 
 import math
 
-from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels._jit import inlined
 from per_obspy.kernels.polynomial_roots import value_and_slope
 from per_obspy.kernels.pounding_events.motion import RAMP_RESPONSE, TERM_COUNT
 from per_obspy.kernels.pounding_lanes.lanes import (
@@ -282,7 +282,7 @@ def _guess_after_contact(series, end, share):
     return better if 0.0 < better < share else time
 
 
-@lean
+@inlined
 def locate_impact(pair, row, ends, origin, other_origin, elapsed, share, segment, has_met):
     """
     Return the time until the impact in a piece whose clearance closes once, and both states then.

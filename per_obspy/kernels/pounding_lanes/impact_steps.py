@@ -25,7 +25,7 @@ because the error of a step has one term that grows with its length and one with
 
 import math
 
-from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels._jit import inlined
 from per_obspy.kernels.pounding_events.contact import (
     COUNTED_SHARE,
     SLOWEST_COUNTED,
@@ -256,7 +256,7 @@ def _bounces_end(pair, row, left, right):
     )
 
 
-@lean
+@inlined
 def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment):
     """
     Carry a free pair through a step of single impacts.

@@ -341,7 +341,7 @@ def _flag_yielding(lanes, flags, kind):
             flags[lane] |= 1 if lanes[at(YIELD_SIDE, lane + BANK)] != 0.0 else 0
 
 
-@lean
+@inlined
 def _sum_of(flags):
     """Return the sum of the flags of all lanes."""
     total = 0
@@ -467,7 +467,7 @@ def flag_relative(lanes, flags):
         flags[lane] |= EVENT_FLAG if opens | closes else 0
 
 
-@lean
+@inlined
 def ground_extremes(ground, count):
     """Return the largest acceleration of a tile (north, east), and its largest change."""
     peak_north = abs(ground[0, 0])
@@ -497,7 +497,7 @@ def _advance_four_steps(kind, lanes, ground, k):
         advance_buildings(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
 
 
-@lean
+@inlined
 def _follow_contacts(kind, lanes, ground, k, begins):
     """Follow contact functions, or relative displacements without contact, to the k-th sample."""
     if kind == APART:

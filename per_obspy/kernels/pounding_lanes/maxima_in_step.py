@@ -296,7 +296,7 @@ def _raise_maxima_at_roots(row, i, function_terms, angle, share):
         time = first_fall(row, 0, EVENT_FUNCTION, function_terms, sign, time, share, 0.0)
 
 
-@lean
+@inlined
 def search_tile(pair, row, i, displacement, velocity, ground, count):
     """Raise the maxima of structure i to those of a tile without events, from its start on."""
     first = i * STRUCTURE_ROWS

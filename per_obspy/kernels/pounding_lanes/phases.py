@@ -9,7 +9,7 @@ share one equation of motion.
 
 import math
 
-from per_obspy.kernels._jit import lean
+from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import value_and_slope
 from per_obspy.kernels.pounding_events.motion import (
     DAMPING_RATE,
@@ -92,7 +92,7 @@ def fill_responses(row, i, column, damping, stiffness, duration):
         row[i, column + 2 * k + 1] = rate
 
 
-@lean
+@inlined
 def _equation_of(row, first, last):
     """
     Return damping, stiffness, drive and force of a cluster: without ground acceleration, now.
@@ -257,7 +257,7 @@ def _write_phase(members, row, first, last, i, equation):
     members[own + IS_CHANGED] = 1.0
 
 
-@lean
+@inlined
 def write_branch(members, row, i, duration):
     """Write all numbers that depend on the branch of a building without contact, for a step, s."""
     equation = _equation_of(row, i, i)

@@ -51,7 +51,7 @@ def _raise_relative_at(row, terms, time):
     raise_relative_to(row, right - left)
 
 
-@lean
+@inlined
 def may_exceed_relative(pair, row, left, right, next_left, next_right):
     """
     Return whether the relative displacement may pass its largest values inside a step.

@@ -67,7 +67,7 @@ def state_at_tile_start(pair, first, ground):
     return complete_state(pair, first, u, z, ground)
 
 
-@lean
+@inlined
 def segment_of_step(row, ground_start, ground_end, duration):
     """Return a step as a segment of linear ground acceleration."""
     slope = (ground_end - ground_start) / duration
@@ -115,7 +115,7 @@ def run_events(row, log, segment, elapsed, is_apart):
     return False
 
 
-@lean
+@inlined
 def _repeat_step(pair, row, log, ends, segment, happens, yields, is_apart):
     """
     Carry a pair through a step that may hold an event; return whether it got through.

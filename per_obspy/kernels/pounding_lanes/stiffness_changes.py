@@ -199,7 +199,7 @@ def _state_nearby(pair, first, state, rates, share):
     return near, z + angle * share * faster, y + share * (rate + 0.5 * share * second)
 
 
-@lean
+@inlined
 def locate_change(pair, row, i, start, end, change, share):
     """
     Return the time of the only change of stiffness of structure i in a piece, and its state then.
@@ -253,7 +253,7 @@ def _change_stiffness(pair, row, i, state, end, duration):
     return u, z, y
 
 
-@lean
+@inlined
 def run_changes(pair, row, i, start, end, segment):
     """
     Carry structure i of a free pair through a step in which it may yield or unload.
@@ -340,7 +340,7 @@ def _restore(pair, row, i, before, duration):
         write_branch(pair, row, i, duration)
 
 
-@lean
+@inlined
 def run_stiffness_changes(pair, row, left, right, next_left, next_right, segment, least, largest):
     """
     Carry a free pair through a step in which its structures may yield or unload.

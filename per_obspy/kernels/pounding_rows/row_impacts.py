@@ -114,7 +114,7 @@ def _may_part(members, row, i, start, end, grounds, share):
     return least - margin < -members[own + CONTACT_ROUNDING] * row[i, LARGEST_DISPLACEMENT]
 
 
-@lean
+@inlined
 def _may_hold_other_event(members, row, window, grounds, share):
     """Return whether bounds do not exclude a release, yielding or unloading in a window."""
     for i in range(row.shape[0]):
@@ -145,7 +145,7 @@ def _safe_closing(row, window, j, room):
     return first_fall(row, j, EVENT_FUNCTION, terms, 1.0, 0.0, room, rounding)
 
 
-@lean
+@inlined
 def _next_impact(row, window, room):
     """Return when the next impact of a window happens, infinite if none, and its interface."""
     for first in range(0, row.shape[0] - 1, WIDTH):
@@ -173,7 +173,7 @@ def _before(window, i):
     return window[at(BEFORE, i)], window[at(BEFORE + 1, i)], window[at(BEFORE + 2, i)]
 
 
-@lean
+@inlined
 def _move(members, row, window, share, ground, change):
     """Move all buildings by a share of the step, with their maxima on the way."""
     for first in range(0, row.shape[0], WIDTH):
@@ -188,7 +188,7 @@ def _move(members, row, window, share, ground, change):
             window[at(LARGEST, i)] = row[i, LARGEST_DISPLACEMENT]
 
 
-@lean
+@inlined
 def _pass_window(members, row, window, segment, elapsed):
     """
     Carry a row to its next impact, or to the end of the window that begins at a share of the step.
@@ -291,7 +291,7 @@ def _apply_single_impact(row, log, hit, time, ground):
     return is_lingering(row, hit, ground)
 
 
-@lean
+@inlined
 def _pass_impact(members, row, log, window, hit, elapsed, segment):
     """
     Apply an impact in which no other building takes part; return whether both then part.

@@ -52,7 +52,7 @@ def _contact_value(members, states, j, column, ground):
     )
 
 
-@lean
+@inlined
 def _may_meet_or_part(members, row, states, j, ground_start, ground_end):
     """Return whether the contact function of an interface may fall through zero in a piece."""
     own = j * STRUCTURE_ROWS
@@ -75,7 +75,7 @@ def _may_meet_or_part(members, row, states, j, ground_start, ground_end):
     return least - margin < -members[own + CONTACT_ROUNDING] * row[j, LARGEST_DISPLACEMENT]
 
 
-@lean
+@inlined
 def _may_yield_in_step(members, row, states):
     """Return whether a building may yield or unload in a piece."""
     for i in range(row.shape[0]):
@@ -86,7 +86,7 @@ def _may_yield_in_step(members, row, states):
     return False
 
 
-@lean
+@inlined
 def _is_open_in_step(members, row, states, j, duration):
     """Return whether an interface is open and certainly stays so in a step, by a cubic."""
     left = state(states, j, START)
@@ -98,7 +98,7 @@ def _is_open_in_step(members, row, states, j, duration):
     )
 
 
-@lean
+@inlined
 def _may_hold_event(members, row, states, before, after, duration):
     """Return whether bounds do not exclude contact, release, yielding or unloading in a step."""
     for j in range(row.shape[0] - 1):

@@ -10,7 +10,7 @@ constants below are the rows of this array.
 
 import math
 
-from per_obspy.kernels._jit import lean, vectorised
+from per_obspy.kernels._jit import inlined, lean, vectorised
 from per_obspy.kernels.pounding_events.motion import (
     GAP,
     GAP_ROUNDING,
@@ -157,7 +157,7 @@ def find_courses(window, room):
         window[at(COURSE, i)] = OPEN if is_open else course
 
 
-@lean
+@inlined
 def closing_share(window, j, room):
     """
     Return when a clearance that closes once in a room falls through zero.
