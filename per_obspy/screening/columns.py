@@ -285,9 +285,9 @@ ORDER = (
 #: were asked for follow.
 CSV_COLUMNS = (
     "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
-    "configuration", "weighted_velocity", "gap", "demand", "demand_rule", "missing_gap", "supplemental_damping", "bumper_restitution",
-    "flags", "place", "name_1", "name_2", "building_id_1", "building_id_2", "longitude",
-    "latitude", "station", "distance",
+    "configuration", "weighted_velocity", "gap", "demand", "demand_rule", "missing_gap",
+    "supplemental_damping", "bumper_restitution", "flags", "place", "name_1", "name_2",
+    "building_id_1", "building_id_2", "longitude", "latitude", "station", "distance",
     "storeys_1", "storeys_2", "system_1", "system_2",
 )  # fmt: skip
 
