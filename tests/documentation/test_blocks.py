@@ -125,7 +125,7 @@ def test_the_worked_pairs_are_those_of_the_tutorial(folder):
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines.splitlines()]
     header, _, *shown = rows
     assert header[0] == "pair"
-    table = pd.read_csv(folder / "out" / "risk.csv").set_index("pair_id")
+    table = pd.read_parquet(folder / "out" / "risk.parquet").set_index("pair_id")
     assert [row[0] for row in shown] == list(table.index)
     for name, gap, demand, rule, probability, state, impact, severity in shown:
         pair = table.loc[name]

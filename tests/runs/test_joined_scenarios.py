@@ -1,6 +1,7 @@
 """Risk tables of scenarios joined on disk: by name, whatever their order and size."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ from pyarrow import parquet
 
 from per_obspy.runs import ensemble
 from per_obspy.runs.ensemble import Scenarios, write_ensemble
+from per_obspy.screening.columns import BY_CONTACT
 
 COUNT = 500
 
@@ -94,7 +96,12 @@ def test_every_file_is_written_and_every_column_described(tables, tmp_path):
     worst = pd.read_csv(tmp_path / "out" / "ensemble.csv")
     # text is of another type
     # the text has five digits
-    pd.testing.assert_frame_equal(worst, table.head(5), check_dtype=False, rtol=5.1e-5, atol=0)
+    # two digits where the contact law decides
+    impacts = worst.columns.intersection(list(BY_CONTACT))
+    others = worst.columns.drop(impacts)
+    same = partial(pd.testing.assert_frame_equal, check_dtype=False, atol=0)
+    same(worst[others], table.head(5)[others], rtol=5.1e-5)
+    same(worst[impacts], table.head(5)[impacts], rtol=5.1e-2)
     columns = pd.read_csv(tmp_path / "out" / "ensemble.columns.csv")
     assert columns["name"].tolist() == list(table)
     assert columns["meaning"].str.len().min() > 5
