@@ -319,6 +319,10 @@ SPANISH: dict[str, str] = {
         "una estimación o un límite: vea cell_notes"
     ),
     "flag_touching": "separación 0: el golpe único está fuera de su rango confiable",
+    "flag_learned_outlines": (
+        "un contorno fue aprendido de imágenes, que no muestran que una separación baste: el "
+        "estado no es no"
+    ),
     "flag_single_hit_unreliable": (
         "separación menor que 0.6 de la demanda: probablemente varios impactos, el golpe único "
         "puede quedar corto"
@@ -431,6 +435,7 @@ SPANISH: dict[str, str] = {
     "flagname_unknown_gap": "separación desconocida",
     "flagname_doubtful_cell": "celda dudosa",
     "flagname_touching": "en contacto",
+    "flagname_learned_outlines": "contornos aprendidos de imágenes",
     "flagname_single_hit_unreliable": "golpe único poco confiable",
     "flagname_outside_usable_periods": "fuera de períodos utilizables",
     "flagname_per_far_above_sd": "PER muy sobre SD",
