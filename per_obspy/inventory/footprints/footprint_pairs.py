@@ -252,6 +252,7 @@ def _with_deviation(pairs: pd.DataFrame, gap_std: float | None) -> pd.DataFrame:
     """
     word = "assumed" if gap_std is None else "given"
     # Of two origins the less accurate one counts
+    # A gap of 0 stays as it is drawn
     touching, drawn = pairs["gap"] == 0.0, ORIGINS["drawn"].gap_std
     deviation = np.full(len(pairs), drawn)
     learned = np.zeros(len(pairs), dtype=bool)
