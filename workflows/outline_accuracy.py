@@ -25,12 +25,18 @@ QUARTERS, BINS = ("san_jose", "guatemala"), (0.0, 0.1, 0.3, 0.5, 1.0, 3.0)
 START, END = "<!-- below: workflows/outline_accuracy.py -->", "<!-- above -->"
 
 
-def touching_neighbours(quarter: str) -> pd.Series:
-    """Return the drawn gaps, m, of pairs that touch by the survey."""
+def surveyed_pairs(quarter: str) -> tuple[pd.DataFrame, pd.Series]:
+    """Return pairs of surveyed buildings, and which touch on both sides of both buildings."""
     folder = data_folder() / "inventories" / "footprints"
     pairs = pairs_from_footprints(folder / f"{quarter}_pilot_region_all_fields.gpkg")
-    touches = [f"touches_{side}_{i}" for side in ("left", "right") for i in (1, 2)]
-    touch = (pairs[touches].astype(str) == "True").all(axis=1)
+    answers = pairs[[f"touches_{side}_{i}" for side in ("left", "right") for i in (1, 2)]]
+    known = answers.astype(str).isin(("True", "False")).all(axis=1)
+    return pairs[known], (answers[known].astype(str) == "True").all(axis=1)
+
+
+def touching_neighbours(quarter: str) -> pd.Series:
+    """Return the drawn gaps, m, of pairs inside their rows that touch by the survey."""
+    pairs, touch = surveyed_pairs(quarter)
     inside = (pairs[["position_1", "position_2"]] == "inside").all(axis=1)
     return pairs.loc[touch & inside, "gap"]
 
@@ -38,13 +44,16 @@ def touching_neighbours(quarter: str) -> pd.Series:
 def page() -> Iterator[str]:
     """Yield the table."""
     titles = [f"to {end:g} m" for end in BINS[1:]]
-    yield f"| quarter | pairs | outlines touch | {' | '.join(titles)} | rms up to 1 m | rms |"
-    yield "|---" * (len(BINS) + 4) + "|"
+    titles += ["rms up to 1 m", "rms", "of outlines that touch, by the survey at least"]
+    yield f"| quarter | pairs | outlines touch | {' | '.join(titles)} |"
+    yield "|---" * (len(BINS) + 5) + "|"
     for quarter in QUARTERS:
         gap = touching_neighbours(quarter).to_numpy()
         counts = np.bincount(np.searchsorted(BINS, gap), minlength=len(BINS))
         rms = [np.sqrt(np.mean(some**2)) for some in (gap[gap <= 1.0], gap)]
         cells = [str(gap.size), *map(str, counts), *(f"{value:.2f} m" for value in rms)]
+        pairs, touch = surveyed_pairs(quarter)
+        cells += [f"{touch[pairs['gap'] == 0.0].mean():.0%}"]
         yield f"| {quarter} | {' | '.join(cells)} |"
 
 

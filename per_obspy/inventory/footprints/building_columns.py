@@ -106,19 +106,19 @@ def schema_columns(
     """
     source = source_of(map(str, attributes.columns))
     cells = converted(attributes, source)
-    table = _named_columns(cells, source, given or {})
+    table = _named_columns(cells, source, given)
     notes, placeholders = _read_sizes(table)
     is_understood = np.array(notes, dtype=object) == ""
-    is_empty = (_has_no_size(table) & is_understood).all() and len(table)
+    is_empty = len(table) and (_has_no_size(table) & is_understood).all()
     if is_empty or not set(SIZES) & set(table):
         raise CatalogError(file, _no_size(table, attributes, source))
     table = _with_origins(table, cells, source, given)
     # Missing heights from the classes of the layer
     if source.class_column is not None:
-        classes = cells.get(source.class_column, pd.Series("", cells.index))
-        table = with_class_heights(table, classes, is_understood)
+        no_class = pd.Series("", cells.index)
+        table = with_class_heights(table, cells.get(source.class_column, no_class), is_understood)
     # A placeholder of a building without any size is a note
-    for row in np.flatnonzero(_has_no_size(table) & is_understood):
+    for row in np.flatnonzero(_has_no_size(table) & is_understood).tolist():
         notes[row] = placeholders.get(row, "")
     if any(notes):
         table[NOTES] = notes
@@ -151,11 +151,11 @@ def _with_origins(
 
 
 def _named_columns(
-    cells: pd.DataFrame, source: Source, given: Mapping[str, pd.Series]
+    cells: pd.DataFrame, source: Source, given: Mapping[str, pd.Series] | None
 ) -> pd.DataFrame:
     """Return the columns of a source, or those that the user names, with systems and names."""
     columns = {name: cells[own] for name, own in source.columns.items() if own in cells}
-    table = pd.DataFrame(columns | dict(given), index=cells.index)
+    table = pd.DataFrame(columns | dict(given or {}), index=cells.index)
     if "system" not in table and (systems := _systems(cells, source)) is not None:
         table["system"] = systems
     return table.assign(building_id=_identifiers(table))

@@ -244,10 +244,17 @@ def _with_positions(pairs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _with_deviation(pairs: pd.DataFrame, gap_std: float | None) -> pd.DataFrame:
-    """Return pairs with the deviation of their gaps: the given one, or that of the outlines."""
+    """
+    Return pairs with the deviation of their gaps: the given one, or that of the outlines.
+
+    Outlines that touch have that of drawn ones, whatever their origin: a wider error would make
+    their contact less likely, for which there is no evidence.
+    """
     word = "assumed" if gap_std is None else "given"
     # Of two origins the less accurate one counts
-    deviation = np.full(len(pairs), ORIGINS["drawn"].gap_std)
+    # A gap of 0 stays as it is drawn
+    touching, drawn = pairs["gap"] == 0.0, ORIGINS["drawn"].gap_std
+    deviation = np.full(len(pairs), drawn)
     learned = np.zeros(len(pairs), dtype=bool)
     for i in (1, 2):
         if f"{OUTLINE_SOURCE}_{i}" in pairs:
@@ -255,7 +262,7 @@ def _with_deviation(pairs: pd.DataFrame, gap_std: float | None) -> pd.DataFrame:
             own = origin.map({name: each.gap_std for name, each in ORIGINS.items()})
             deviation, learned = np.maximum(deviation, own), learned | origin.isin(LEARNED)
     return pairs.assign(
-        gap_std=deviation if gap_std is None else gap_std,
+        gap_std=np.where(touching, drawn, deviation) if gap_std is None else gap_std,
         gap_std_source=np.where(learned, "learned", word),
     )
 

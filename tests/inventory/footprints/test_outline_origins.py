@@ -17,11 +17,11 @@ from per_obspy.inventory.footprints.sources import ORIGINS, outline_origins, sou
 SIDE, STEP = 10.0 / 111_320.0, 10.5 / 111_320.0
 
 
-def _layer(path, rows):
+def _layer(path, rows, step=STEP):
     """Write a row of houses, one per set of properties, as GeoJSON."""
     features = []
     for number, properties in enumerate(rows):
-        west = 20.0 + number * STEP
+        west = 20.0 + number * step
         ring = [[west, 0.0], [west + SIDE, 0.0], [west + SIDE, SIDE], [west, SIDE], [west, 0.0]]
         shape = {"type": "Polygon", "coordinates": [ring]}
         features.append({"type": "Feature", "geometry": shape, "properties": properties})
@@ -64,6 +64,15 @@ def test_a_given_deviation_stays_and_learned_outlines_stay_learned(tmp_path):
     pairs = find_footprint_pairs(_layer(tmp_path / "town.geojson", rows), gap_std=0.05).pairs
     assert set(pairs["gap_std"]) == {0.05}
     assert set(pairs["gap_std_source"]) == {"learned"}
+
+
+def test_a_wide_error_does_not_make_touching_outlines_safer(tmp_path):
+    # would catch: the deviation of the origin for a gap of 0
+    rows = [_overture("Microsoft ML Buildings", number) for number in range(2)]
+    pairs = find_footprint_pairs(_layer(tmp_path / "town.geojson", rows, step=SIDE)).pairs
+    assert pairs["gap"].tolist() == [0.0]
+    assert pairs["gap_std"].tolist() == [0.1]
+    assert pairs["gap_std_source"].tolist() == ["learned"]
 
 
 def test_learned_heights_are_uncertain_by_one_storey():
