@@ -265,7 +265,8 @@ RESULTS: dict[str, Column] = {
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
     "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
-    "impact_velocity_84", "expected_amplification", "configuration", "weighted_velocity", "gap", "demand", "demand_rule", "demand_ratio",
+    "impact_velocity_84", "expected_amplification", "configuration", "weighted_velocity", "gap",
+    "demand", "demand_rule", "demand_ratio",
     "impact_velocity", "impacts", "impact_velocity_exact",
     "amplification_exact_1", "amplification_exact_2", "single_hit_status", "amplification_1",
     "amplification_2", "flags", "station", "distance", "azimuth_used", "azimuth_rule",
