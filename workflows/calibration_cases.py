@@ -221,9 +221,13 @@ def outcomes(rows: pd.DataFrame, sites: Sequence[Site], seed: int) -> NDArray[np
 def _true_pairs(rows: pd.DataFrame, generator: np.random.Generator) -> pd.DataFrame:
     """Draw true periods, dampings and gaps from the table's uncertainties."""
     true = rows.copy()
+    deviates = generator.standard_normal((4, len(rows)))
+    # alike neighbours miss a period formula alike
+    shared = values(rows, "period_correlation")
+    deviates[2] = shared * deviates[0] + np.sqrt(1.0 - shared**2) * deviates[2]
     for i in (1, 2):
-        for name in ("period", "damping"):
-            scatter = values(rows, f"{name}_log_std_{i}") * generator.standard_normal(len(rows))
+        for number, name in enumerate(("period", "damping"), start=2 * i - 2):
+            scatter = values(rows, f"{name}_log_std_{i}") * deviates[number]
             true[f"{name}_{i}"] = values(rows, f"{name}_{i}") * np.exp(scatter)
         # the strength is what is given: the displacement at yield follows the true period
         true[f"yield_displacement_{i}"] *= (true[f"period_{i}"] / rows[f"period_{i}"]) ** 2
