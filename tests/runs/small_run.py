@@ -55,7 +55,7 @@ def write_smallest_configuration(folder: Path, text: str = "") -> Path:
     return file
 
 
-def plain_figure(*arguments: object) -> None:
+def plain_figure(*arguments: object, **_: object) -> None:
     """Write a figure as a short file: most of the time of a small run goes into its figures."""
     with written_whole(Path(str(arguments[-1]))) as part:
         part.write_bytes(b"a figure")
