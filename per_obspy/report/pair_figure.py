@@ -54,7 +54,9 @@ def differing_pair(worst: pd.DataFrame) -> "pd.Series[Any] | None":
     return pair
 
 
-def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path, note: str = "") -> None:
+def draw_record_to_pair(
+    station: xr.Dataset, pair: pd.Series, path: Path, *, note: str = ""
+) -> None:
     """
     Draw a record, its PER spectrum, and the energy circles of a pair in the state space.
 

@@ -183,7 +183,7 @@ def _draw_worst_pair(
     assert station.shard is not None  # chosen so
     motion = read_station_once(station.shard, station.hash)
     with report.tried(walk):
-        draw_record_to_pair(motion, worst, walk, DIFFERING)
+        draw_record_to_pair(motion, worst, walk, note=DIFFERING)
 
 
 def _number(value: Any) -> float:

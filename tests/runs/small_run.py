@@ -55,7 +55,7 @@ def write_smallest_configuration(folder: Path, text: str = "") -> Path:
     return file
 
 
-def plain_figure(*arguments: object) -> None:
+def plain_figure(*arguments: object, **_: object) -> None:
     """Write a figure as a short file: most of the time of a small run goes into its figures."""
     (path,) = (argument for argument in arguments if isinstance(argument, Path))
     with written_whole(path) as part:
