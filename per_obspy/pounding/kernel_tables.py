@@ -294,7 +294,7 @@ def run_blocks(
     """
     Carry all pairs through a record and the free vibration after it, in blocks on all processors.
 
-    By ``run_block`` or ``run_without_contact``, whose lanes have ``lane_rows``. The components (2,
+    By ``run_block``, of pairs that touch or never do, in lanes of ``lane_rows``. The components (2,
     n_samples) are in m/s², dt in s; ``rows`` (n_pairs, 2, ROW_COLUMNS) are at rest, then at the
     end. Each pair has its steps of a sampling interval, sampling intervals of free vibration at
     most, and azimuth (rad). Return impacts that count (`count_impacts`); ``RuntimeError`` if a step

@@ -1,6 +1,7 @@
 """Largest relative displacement of pairs in a record, without contact: the exact critical gap."""
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +9,8 @@ import numpy as np
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes.run_without_contact import (
-    LANE_ROWS_WITHOUT_CONTACT,
-    UNREACHABLE,
-    run_without_contact,
-)
+from per_obspy.kernels.pounding_lanes.lanes import APART, LANE_ROWS_WITHOUT_CONTACT
+from per_obspy.kernels.pounding_lanes.run_block import UNREACHABLE, run_block
 from per_obspy.kernels.relative.relative_maxima import relative_maxima
 from per_obspy.pounding.kernel_tables import (
     both_components,
@@ -344,8 +342,8 @@ def yielding_relative_displacement(
         gap=UNREACHABLE,
     )
 
-    # Run the record and the free vibration after it
-    kernel = run_without_contact, LANE_ROWS_WITHOUT_CONTACT
+    # Run pairs that never touch through the record and the free vibration after it
+    kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
     rows, _ = run_pairs(*kernel, closed_record(record), step, pairs, free_vibration=True)
 
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1

@@ -10,11 +10,16 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
-from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
-from per_obspy.kernels.pounding_lanes.run_block import run_block
+from per_obspy.kernels.pounding_lanes.lanes import (
+    LANE_ROWS,
+    PAIR_LANES,
+    ROWS,
+    STRUCTURE_ROWS,
+    TILE_STEPS,
+)
+from per_obspy.kernels.pounding_lanes.run_block import run_block, run_lanes
 from per_obspy.kernels.pounding_rows.pieces import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.kernels.pounding_rows.run_rows import run_rows
 from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
 from per_obspy.pounding.kernel_tables import (
     SHORTEST_BOUNCE,
@@ -214,11 +219,12 @@ def _run_in_lanes(
     grounds = np.empty((2, 2, TILE_STEPS + 1))
 
     # Lanes as lines, states of a step and deferred tiles
-    members = np.zeros((PAIR_LANES, LANE_ROWS))
+    members = np.zeros(PAIR_LANES * STRUCTURE_ROWS)
     states = np.zeros((PAIR_LANES, STATE_COLUMNS))
     deferred = np.zeros((PAIR_LANES, DEFERRED_COLUMNS))
-    memory = members, lines, logs, states, deferred, aligned(WINDOW_SIZE)
-    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, *direction, free)
+    memory = members, lines, logs, deferred, states, aligned(WINDOW_SIZE)
+    motion = firsts, *direction, free
+    is_through = run_lanes(ROWS, record, lanes, flags, grounds, memory, *motion)
     own[:] = lines[: len(own)]
     return bool(is_through)
 
