@@ -40,7 +40,7 @@ PREVENTION_WORDS = {
 
 #: Reason of class and rank where the exact history has no impact.
 NO_IMPACT = (
-    "The record alone, with the likeliest buildings, closes no gap. Class and rank count every "
+    "The likeliest values of this pair give no impact in the record. Class and rank count every "
     "outcome of uncertain periods, dampings, gap and motion at the site: {hit} of them hit."
 )
 
