@@ -38,8 +38,8 @@ EC8_HEIGHT = 40.0
 #: one system, and of others. Reasoned, as no survey of neighbours was found: the deviations above
 #: are those of whole stocks, of many builders, codes, infills and soils, of which neighbours share
 #: most. With 0.85 the periods of two alike differ by a log-standard deviation of 0.55 of one
-#: period's. Even nine tower blocks of one design at one site have different frequencies (Ellis &
-#: Littler, "Dynamic response of nine similar tower blocks"; only the summary was read).
+#: period's. Even nine tower blocks of one design at one site have different frequencies ("Dynamic
+#: response of nine similar tower blocks", by Ellis and Littler from memory; summary only).
 ALIKE, ONE_SYSTEM, OTHERS = 0.85, 0.5, 0.2
 #: Chance that two neighbours have one system where one is ``other``: masonry or unknown. Reasoned.
 ONE_SYSTEM_CHANCE = 0.5

@@ -111,9 +111,10 @@ def _alert_sentence(results: Results) -> str:
     """Return how many pairs hit each other, and how many of them how hard."""
     tally = results.tally
     known = tally.pairs - tally.states["unknown"]
-    share = 100.0 * tally.expected / known
-    # 100 only if it is all, 0 only if it is none
-    percent = results.written(share if share in (0.0, 100.0) else min(share, 99.0))
+    # Of the number that is written; 100 only if it is all, 0 only if it is none
+    share = 100.0 * (_rounded(tally.expected) or tally.expected) / known
+    share = min(share, 100.0) if tally.expected == known else min(share, 99.0)
+    percent = results.written(share)
     if 0.0 < share < 1.0:
         percent = results.texts["alert_under"]
     key = "alert_pairs" if results.coverage.pairs == known else "alert_screened"
