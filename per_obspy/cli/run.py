@@ -431,6 +431,10 @@ def _print_worst(folder: Path, count: int) -> None:
         for row in _worst_rows(folder, list(SHOWN), count)
     ]
     print_table(f"The {len(worst)} worst pairs", titles, worst)
+    print(
+        "Ranked by impact, doubled where floors meet columns, half as much again where a tall "
+        "building stands beside a low one."
+    )
 
 
 def _worst_rows(folder: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:

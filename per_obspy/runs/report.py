@@ -203,5 +203,5 @@ def _provenance(settings: Run) -> list[tuple[str, str]]:
         made_with(language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
-        *content_note([LANGUAGES[language]["page_shakemap"]] if has_map else [], language),
+        content_note([LANGUAGES[language]["page_shakemap"]] if has_map else [], language),
     ]

@@ -164,11 +164,14 @@ def test_the_rows_of_the_readme_are_those_of_the_demonstration():
     lines = text.partition("| rank | pair_id |")[2].splitlines()[2:5]
     table = pd.read_csv(made, nrows=3)
     for line, (_, row) in zip(lines, table.iterrows(), strict=True):
-        rank, pair, severity, state, impact, gap, demand = line.strip("| ").split(" | ")
+        rank, pair, severity, state, *rest = line.strip("| ").split(" | ")
+        impact, configuration, weighted, gap, demand = rest
+        assert configuration == row["configuration"]
         assert [int(rank), pair, severity, state] == [
             *row[["rank", "pair_id", "risk_class", "state"]]
         ]
         # the page shows five digits; compilers may change the last ones after many impacts
-        shown = [float(value) for value in (impact, gap, demand)]
-        found = row[["expected_impact_velocity", "gap", "demand"]].astype(float)
+        shown = [float(value) for value in (impact, weighted, gap, demand)]
+        names = ["expected_impact_velocity", "weighted_velocity", "gap", "demand"]
+        found = row[names].astype(float)
         assert shown == pytest.approx(found.tolist(), rel=1e-3)

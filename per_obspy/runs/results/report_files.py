@@ -421,6 +421,7 @@ def made_with(language: str) -> tuple[str, str]:
     return LANGUAGES[language]["made_with"], f"per_obspy {version('per_obspy')}"
 
 
-def content_note(notes: Sequence[str], language: str) -> list[tuple[str, str]]:
-    """Return sentences on the content of the page as a row of its provenance."""
-    return [(LANGUAGES[language]["page_content"], " ".join(notes))] if notes else []
+def content_note(notes: Sequence[str], language: str) -> tuple[str, str]:
+    """Return sentences on the content of the page, and the source of its towns, as provenance."""
+    texts = LANGUAGES[language]
+    return texts["page_content"], " ".join([*notes, texts["page_places"]])

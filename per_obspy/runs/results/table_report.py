@@ -68,7 +68,7 @@ def report_design(
     results = Results(
         "design", region, coverage, language, Revision(), source,
         own=list(DESIGN), class_limits=settings.screening.classes,
-        provenance=[made_with(language), *content_note([texts["page_design"]], language)],
+        provenance=[made_with(language), content_note([texts["page_design"]], language)],
     )  # fmt: skip
     reader, outlines = (
         TableReader(classes, settings.totals, len(table)),
@@ -116,7 +116,7 @@ def report_ensemble(
         "ensemble", region, coverage, language, Revision(), source,
         stations=stations, own=list(ensemble_columns(settings.weights, settings.yearly)),
         class_limits=limits.classes,
-        provenance=[made_with(language), *content_note([texts["page_ensemble"]], language)],
+        provenance=[made_with(language), content_note([texts["page_ensemble"]], language)],
     )  # fmt: skip
     # Buildings, outlines and histories are those of the runs
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(folder / "ensemble.parquet"))
