@@ -424,6 +424,7 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 
 def _print_worst(folder: Path, count: int) -> None:
     """Print the worst pairs as a table."""
+    # Probabilities in percent, as people say them
     titles = list(SHOWN.values())
     at = list(SHOWN).index("probability")
     worst = [

@@ -302,9 +302,11 @@ def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
         width, height = frame.east - frame.west, frame.north - frame.south
         corner = frame.west, frame.south
         axes.add_patch(Rectangle(corner, width, height, fill=False, linewidth=0.8, zorder=4))
-        # Next to its corner, whatever the scale
-        place: dict[str, Any] = {"xytext": (3.0, 3.0), "textcoords": "offset points"}
-        axes.annotate(letter, (frame.east, frame.north), fontweight="bold", zorder=5, **place)
+        # Inside of its corner, whatever the scale, on white: places may touch
+        place: dict[str, Any] = {"xytext": (3.0, -3.0), "textcoords": "offset points"}
+        place["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        at = frame.west, frame.north
+        axes.annotate(letter, at, fontweight="bold", zorder=5, va="top", **place)
 
 
 def _draw_places(
