@@ -118,6 +118,9 @@ linearized_correlation
 
 process
     Process the records of a stream so that spectra can be computed from them.
+
+**Records**
+
 read_records
     Read strong-motion records of files and folders, ready for :func:`per_obspy.process`.
 
@@ -140,6 +143,11 @@ shear_building
 
 risk_table
     Compute ground motion, demand, state and severity of pairs: one row per pair, worst first.
+
+**Whole runs**
+
+run
+    Do a whole run: records to spectra to risk table to figures.
 screen
     Screen pairs by records: process, compute spectra, and return the risk table.
 
@@ -151,11 +159,6 @@ plot_risk
     Plot the pairs of a risk table on a map, in the colours of their risk classes.
 plot_spectra
     Plot the pseudo energy radius against the natural period.
-
-**Whole runs**
-
-run
-    Do a whole run: records to spectra to risk table to figures.
 """
 
 import lazy_loader

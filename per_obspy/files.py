@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from per_obspy.errors import PerError, WriteError, WrongOutput
 
@@ -333,3 +333,23 @@ def bytes_hash(content: bytes) -> str:
 def content_hash(content: Mapping[str, object]) -> str:
     """Return the hash of plain values, in whichever order they were put together."""
     return bytes_hash(json.dumps(content, sort_keys=True).encode())
+
+
+#: Largest JSON file of a program's state that is read, bytes.
+LARGEST_JSON = 1 << 24
+
+
+def write_json(file: Path, content: Mapping[str, Any]) -> None:
+    """Write plain values as JSON, whole or not at all."""
+    with written_whole(file) as part:
+        part.write_text(f"{json.dumps(content, indent=1)}\n", encoding="utf-8")
+
+
+def read_json(file: Path) -> dict[str, Any]:
+    """Return the content of a JSON file; empty if it is missing or damaged."""
+    try:
+        with file.open(encoding="utf-8") as text:
+            content = json.loads(text.read(LARGEST_JSON))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}

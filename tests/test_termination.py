@@ -187,7 +187,7 @@ def small_run(folder, workers):
     command = [sys.executable, "-c", WITHOUT_FIGURES, "run", str(folder / "run.toml")]
     return subprocess.Popen(
         [*command, "--set", f"workers={workers}"],
-        cwd=CHECKOUT / "tests" / "pipeline",
+        cwd=CHECKOUT / "tests" / "runs",
         env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

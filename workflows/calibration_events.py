@@ -15,7 +15,7 @@ from per_obspy.config import Processing, Records, Spectra
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.records.sources import find_sources
 from per_obspy.records.text_table import read_columns
-from per_obspy.runs.stations import finished_stations, station_jobs
+from per_obspy.runs.stations import finished_stations, station_tasks
 from per_obspy.runs.tasks.parallel import Workers
 from per_obspy.screening.site_motion import HYPOCENTRE, Hypocentre, hypocentre_of
 from per_obspy.spectra.storage import read_spectra
@@ -96,8 +96,8 @@ def _stations(folder: Path, cache: Path) -> dict[str, xr.Dataset]:
         print(error)
         return {}
     shards = cache / folder.name
-    jobs = station_jobs(found.stations, shards, Processing(), Spectra(), found.event)
-    done = finished_stations(jobs, Workers(1))
+    tasks = station_tasks(found.stations, shards, Processing(), Spectra(), found.event)
+    done = finished_stations(tasks, Workers(1))
     return {
         station.station: read_spectra(station.shard, station.shard.read_bytes())
         for station in done

@@ -21,7 +21,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Processing, Records, Spectra
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.records.sources import find_sources
-from per_obspy.runs.stations import finished_stations, station_jobs
+from per_obspy.runs.stations import finished_stations, station_tasks
 from per_obspy.runs.tasks.parallel import Workers
 from per_obspy.screening.amplitudes import (
     FLAGGED,
@@ -109,8 +109,8 @@ def stations_of(folder: Path, cache: Path) -> list[xr.Dataset]:
         return real_events([folder], cache)[0].stations
     # Clocks of Maule are wrong by more than an hour
     found = find_sources(Records(folder=folder, event_gap=5400.0), None)
-    jobs = station_jobs(found.stations, cache, Processing(), Spectra(), found.event)
-    done = [one.spectra for one in finished_stations(jobs, Workers(1))]
+    tasks = station_tasks(found.stations, cache, Processing(), Spectra(), found.event)
+    done = [one.spectra for one in finished_stations(tasks, Workers(1))]
     stations = [placed(one, folder / PLACES) for one in done if one is not None]
     return [one for one in stations if np.isfinite(one["longitude"].item())]
 

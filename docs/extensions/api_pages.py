@@ -23,9 +23,11 @@ ROOMS = {
     "pounding.linearization": "Yielding buildings",
     "pounding.equivalent_linear": "Yielding buildings",
     "processing": "Processing of records",
+    "records": "Records",
     "inventory": "Buildings and pairs",
     "screening": "Screening",
     "runs": "Whole runs",
+    "report": "Figures",
 }
 
 

@@ -8,7 +8,7 @@ from tables import code, table, write_page
 from per_obspy.inventory.schema import COLUMNS, Column
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import ORDER, csv_columns, known_column
-from per_obspy.screening.flags import FLAGS
+from per_obspy.screening.meanings import FLAGS
 
 RISK = """
 # Columns of `risk.parquet`

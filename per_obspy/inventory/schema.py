@@ -234,3 +234,27 @@ COMPLETED: dict[str, Column] = {
         Column("derived", "str", "", "columns of this row that were derived or assumed, not given"),
     )
 }  # fmt: skip
+
+#: Suspicions of single rows and the meaning of each; chosen limits are in :mod:`.suspicions`.
+ROW_SUSPICIONS: dict[str, str] = {
+    "odd_gap": (
+        "the gap is above 3 m, wider than the distance between the positions, or less than its "
+        "own standard deviation: see pair_tables in run.json"
+    ),
+    "odd_positions": (
+        "both buildings have one position, or positions too far apart for neighbours"
+    ),
+    "odd_azimuth": "the azimuth is at right angles or opposite to the line between the positions",
+    "odd_height": (
+        "height, storeys, contact height or floor offset are possible but odd, as in feet or "
+        "centimetres, or storeys with decimals"
+    ),
+    "odd_period": "a period is far from what the height suggests, as a frequency is",
+    "odd_building": (
+        "damping, mass, strength or participation are possible but odd, as in per cent or tonnes"
+    ),
+    "repeated_pair": "an earlier row of the pair table has the same two buildings",
+    "contradicting_building": (
+        "an earlier row gives a building of the same building_id other values or another place"
+    ),
+}

@@ -15,7 +15,7 @@ from importlib.resources.abc import Traversable
 from io import BytesIO
 from struct import pack
 
-from per_obspy.screening.columns import DEMAND_RULES, FLAGS
+from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
 
 #: Texts of these kinds of results replace the general ones; a plan is no earthquake.
 ENDINGS = {"risk": (), "design": ("_plan", "_design"), "ensemble": ("_plan", "_ensemble")}

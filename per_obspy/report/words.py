@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from per_obspy.errors import shortened
 from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
-from per_obspy.screening.columns import DEMAND_RULES, FLAGS
+from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import UNKNOWN_STATE
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 

@@ -7,9 +7,10 @@ import xarray as xr
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
-from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
+from per_obspy.inventory.schema import ROW_SUSPICIONS
+from per_obspy.inventory.suspicions import ODD
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.screening.columns import FLAGS, RECORD_FLAGS
+from per_obspy.screening.meanings import FLAGS, RECORD_FLAGS
 from per_obspy.screening.values import BoolArray, Table, TextArray, both, number, values
 from per_obspy.spectra.station import lacks_azimuths
 

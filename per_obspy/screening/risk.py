@@ -18,7 +18,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.suspicions import ODD
 from per_obspy.screening.assignment import assigned, stations_of
 from per_obspy.screening.codes import code_columns, rule_columns
-from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
+from per_obspy.screening.columns import ORDER, RESULTS
 from per_obspy.screening.estimates import demand_columns
 from per_obspy.screening.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.exact_population import record_population
@@ -27,6 +27,7 @@ from per_obspy.screening.flags import (
     raised_by_pairs,
     raised_by_record,
 )
+from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, state_columns, worst_first
 from per_obspy.screening.shakemap import shakemap_rows

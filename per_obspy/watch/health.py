@@ -17,9 +17,10 @@ from pydantic import Field
 
 from per_obspy.config.section import Moment
 from per_obspy.errors import CatalogError
+from per_obspy.files import write_json
 from per_obspy.resume import Comparison, Status, StatusError, compare_outputs
 from per_obspy.resume import read_status as read_record
-from per_obspy.watch.state import State, moment, read_state, write_json
+from per_obspy.watch.state import State, moment, read_state
 
 #: Name of the file in the folder that is watched into.
 STATUS = "status.json"

@@ -12,13 +12,13 @@ from typing import Any
 
 from per_obspy.config import Notify, Run, load
 from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of, shortened
+from per_obspy.files import read_json, write_json
 from per_obspy.progress import Progress, silent
 from per_obspy.results.ranked_table import table_files
 from per_obspy.runs.output_folder import Result, now
 from per_obspy.runs.run import run
 from per_obspy.watch.logs import without_secrets
 from per_obspy.watch.notification import Message, notify
-from per_obspy.watch.state import read_json, write_json
 
 log = logging.getLogger(__name__)
 

@@ -11,10 +11,10 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Reach, Run, TableForm
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
+from per_obspy.files import read_json, write_json
 from per_obspy.inventory.catalogue import Box, stored_inventories
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.screening.motion_field import great_circle
-from per_obspy.watch.state import read_json, write_json
 
 #: Side of the cells that stand for the pairs in them, degrees.
 CELL = 0.05

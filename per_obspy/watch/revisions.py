@@ -12,6 +12,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import (
     content_hash,
     file_hash,
+    read_json,
     sync_folder,
     temporary_folder,
     writing,
@@ -24,7 +25,6 @@ from per_obspy.results.ranked_table import table_files, table_outputs
 from per_obspy.resume import write_status
 from per_obspy.runs.output_folder import RECORD
 from per_obspy.runs.provenance import CONFIGURATION
-from per_obspy.watch.state import read_json
 
 #: Name of the table in a revision.
 CHANGES = "changes.csv"

@@ -11,9 +11,8 @@ due at once, which one run serves; a clock that is put back makes those due agai
 times still to come.
 """
 
-import json
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -23,7 +22,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from per_obspy.config.section import Moment, Section
 from per_obspy.errors import CatalogError, MachineFault, PerError, TryLater, reason_of, shortened
-from per_obspy.files import written_whole
+from per_obspy.files import write_json
 from per_obspy.machine import machine_fault
 from per_obspy.names import inside
 from per_obspy.records.earthquakes.earthquake import Earthquake
@@ -271,22 +270,6 @@ def read_state(file: Path, kind: type[StateType]) -> StateType:
     except (OSError, ValueError) as error:
         problem = f"cannot be read: {shortened(reason_of(error), 200)}"
         raise CatalogError(str(file), problem) from error
-
-
-def write_json(file: Path, content: Mapping[str, Any]) -> None:
-    """Write plain values as JSON, whole or not at all."""
-    with written_whole(file) as part:
-        part.write_text(f"{json.dumps(content, indent=1)}\n", encoding="utf-8")
-
-
-def read_json(file: Path) -> dict[str, Any]:
-    """Return the content of a JSON file; empty if it is missing or damaged."""
-    try:
-        with file.open(encoding="utf-8") as text:
-            content = json.loads(text.read(LARGEST))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 #: Pauses after failures, s: the shortest, which doubles, and the longest.

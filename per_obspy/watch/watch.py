@@ -16,7 +16,7 @@ from typing import NamedTuple
 from per_obspy import termination
 from per_obspy.config import Run, Watch
 from per_obspy.errors import PerError, TryLater, shortened
-from per_obspy.files import remove_file
+from per_obspy.files import read_json, remove_file, write_json
 from per_obspy.progress import Progress, silent
 from per_obspy.runs.output_folder import RECORD, Result, locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
@@ -42,8 +42,6 @@ from per_obspy.watch.state import (
     noted_faults,
     pause,
     read_event_states,
-    read_json,
-    write_json,
 )
 
 log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from blocks import ROOT, pages
 import per_obspy
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.screening.columns import ORDER
-from per_obspy.screening.flags import FLAGS
+from per_obspy.screening.meanings import FLAGS
 
 
 @pytest.fixture(scope="module")

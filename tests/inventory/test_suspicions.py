@@ -15,7 +15,8 @@ from per_obspy import read_pairs
 from per_obspy.inventory.earlier_rows import FirstValues
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
-from per_obspy.inventory.suspicions import ODD, ROW_SUSPICIONS
+from per_obspy.inventory.schema import ROW_SUSPICIONS
+from per_obspy.inventory.suspicions import ODD
 
 FOOT = 0.3048
 EARTH = 111_195.0

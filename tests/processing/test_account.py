@@ -25,7 +25,7 @@ from per_obspy.processing.account import (
 )
 from per_obspy.processing.chain import pass_through
 from per_obspy.processing.earthquake import fallback_highpass
-from per_obspy.screening.columns import RECORD_FLAGS
+from per_obspy.screening.meanings import RECORD_FLAGS
 
 
 def test_a_copy_is_equal_and_shares_nothing_but_samples_and_response():

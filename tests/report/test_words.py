@@ -66,8 +66,8 @@ def test_an_unknown_gap_is_no_promise():
 def test_a_rank_is_explained_where_the_record_shows_no_impact():
     # would catch "rank 1, severe" beside "0 impacts" without a reason
     lines = pair_lines(PAIR | {"impacts": 0, "impact_velocity_exact": 0.0, "rank": 1})
-    assert "In this record: 0 impacts, the fastest 0 cm/s." in lines
-    reason = lines[lines.index("In this record: 0 impacts, the fastest 0 cm/s.") + 1]
+    assert "In this record: 0 impacts, the fastest 0 m/s." in lines
+    reason = lines[lines.index("In this record: 0 impacts, the fastest 0 m/s.") + 1]
     assert "count every outcome" in reason
     assert "52 of 100" in reason
     # Nothing to explain where no outcome hits, or where the gap is unknown

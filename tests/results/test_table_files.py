@@ -8,12 +8,12 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import Column
 from per_obspy.results.table_files import (
     as_arrow,
-    write_columns,
     write_csv,
     write_described,
     write_parquet,
     write_rejected,
 )
+from per_obspy.screening.columns import column_table
 
 
 def test_types_are_those_of_the_schema():
@@ -44,7 +44,7 @@ def test_tables_are_written_without_their_attributes(tmp_path):
 
 
 def test_columns_have_unit_and_meaning(tmp_path):
-    write_columns(["pair_id", "gap"], tmp_path / "known.csv")
+    write_csv(column_table(["pair_id", "gap"]), tmp_path / "known.csv")
     known = pd.read_csv(tmp_path / "known.csv").set_index("name")
     assert known.loc["gap", "unit"] == "m"
     # columns that the schema does not know

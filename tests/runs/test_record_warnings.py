@@ -11,7 +11,7 @@ import pytest
 from per_obspy.cli.run import print_result
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.runs.run import run, screen
-from per_obspy.screening.columns import RECORD_FLAGS
+from per_obspy.screening.meanings import RECORD_FLAGS
 
 from .small_run import SPECTRA, InProcess, write_folder_configuration
 

@@ -105,6 +105,11 @@ def set_dataset(folder, pairs):
     write_configuration(folder, lines)
 
 
+def _untimed(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Return files without the line of their time of issue."""
+    return {name: re.sub(rb"\nIssued [^\n]*", b"", content) for name, content in files.items()}
+
+
 def test_a_dataset_by_cell_gives_the_same_results(copied, call):
     # would catch a reader that takes the first cell for the worst pairs, or totals of one cell
     before, out = results(copied), copied / "out"
@@ -121,7 +126,9 @@ def test_a_dataset_by_cell_gives_the_same_results(copied, call):
     (out / "risk.parquet").write_bytes(before["risk.parquet"])
     assert results(copied) == before
     (out / "risk.parquet").unlink()
-    assert {name: (out / name).read_bytes() for name in read_from_it} == read_from_it
+    # but for the time of issue
+    read = {name: (out / name).read_bytes() for name in read_from_it}
+    assert _untimed(read) == _untimed(read_from_it)
     # again from the dataset alone
     totals = (out / "totals.csv").read_bytes()
     report(copied / "run.toml")
@@ -216,12 +223,12 @@ def test_a_pair_that_cannot_be_computed_costs_no_other(copied, monkeypatch):
     assert rejected.loc[victim, "reasons"] == "period_1 is not to my taste"
 
 
-def _is_broken(_):
+def _is_broken(_task):
     raise RuntimeError("no luck")
 
 
 def test_a_worker_that_fails_leaves_a_reason_for_every_pair(copied, monkeypatch):
-    monkeypatch.setattr(chunk, "do_chunk", _is_broken)
+    monkeypatch.setattr(chunk.ChunkTask, "do", _is_broken)
     shutil.rmtree(copied / "out" / "chunks")
     result = screen(copied / "run.toml", executor=InProcess())
     assert result.record["state"] == "nothing_usable"
@@ -383,11 +390,8 @@ def test_coverage_is_the_first_number_everywhere(half_lost, call):
     assert content["warns"]
     assert content["coverage"][0].startswith(warning)
     assert content["coverage"][1].startswith(account)
-    assert content["numbers"][0] == ["32", "of 60 pairs are screened"]
     text = (folder / "out" / "summary.txt").read_text()
     assert text.startswith("28 of 60 neighbouring pairs (47 percent) have NO VERDICT")
-    numbers = text.split("FIVE NUMBERS\n")[1]
-    assert numbers.startswith("32 of 60 pairs are screened.")
 
 
 @pytest.mark.parametrize("size", [7, 25])
@@ -415,11 +419,12 @@ def test_cells_are_named_with_their_places_across_the_date_line(half_lost, tmp_p
     table = pd.read_csv(tmp_path / "pairs.csv")
     table.loc[:19, ["longitude_1", "longitude_2"]] = 179.9999, -179.9997
     table.loc[:19, ["latitude_1", "latitude_2"]] = 0.004
-    table.to_csv(tmp_path / "pairs.csv", index=False)
+    # Without a name of its own a place has that of its cell
+    table.drop(columns="ward").to_csv(tmp_path / "pairs.csv", index=False)
     write_configuration(tmp_path, '[pairs]\nfile = "pairs.csv"\n')
     found = screen(tmp_path / "run.toml", executor=InProcess()).record["coverage"]
     name, count = found["areas"][0]
     assert count == 20
-    place = [float(number) for number in name.partition("(")[2].strip(")").split(", ")]
-    # Half a cell of 1 km at most
-    assert_allclose(place, [0.004, -180.0], atol=0.0046)
+    north, east = re.fullmatch(r"([\d.]+) N, ([\d.]+) [EW]", name).groups()
+    # Half a cell of 1 km at most; at 180 degrees east is west
+    assert_allclose([float(north), float(east)], [0.004, 180.0], atol=0.0046)

@@ -5,13 +5,13 @@ from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import (
     BY_CONTACT,
     CSV_COLUMNS,
-    FLAGS,
     ORDER,
     RESULTS,
     column_table,
     csv_columns,
     known_column,
 )
+from per_obspy.screening.meanings import FLAGS
 
 
 def test_every_leading_column_is_known_and_occurs_once():

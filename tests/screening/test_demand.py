@@ -67,5 +67,8 @@ def test_demands_are_proportional_to_the_motion():
 
 def test_ratio_is_empty_only_without_demand():
     table = pd.DataFrame({"gap": [0.0, 0.1, 0.1], "demand": [0.2, 0.2, 0.0]})
-    table = table.assign(probability=0.5, expected_impact_velocity=0.1)
+    table = table.assign(probability=0.5, expected_impact_velocity=0.1, floors_misaligned=False)
+    equal = {"storeys": 3.0, "mass": 1e6, "sd": 0.1, "hazus_yield": np.nan}
+    of_both = {f"{name}_{i}": value for name, value in equal.items() for i in (1, 2)}
+    table = table.assign(yield_displacement_1=np.inf, yield_displacement_2=np.inf, **of_both)
     assert_array_equal(state_columns(table, Screening())["demand_ratio"], [0.0, 0.5, np.nan])

@@ -190,7 +190,7 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     at_site = table.assign(ln_per_ratio_1=0.2, ln_per_ratio_2=0.2, ln_per_std_1=0.3, ln_per_std_2=0)
     at_site = at_site.assign(distance=0.0)
     # only period 1 varies
-    nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.eye(6)[0]
+    nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.eye(9)[0]
     demand = directional_relative_displacement(
         record.north, record.east, record.dt, 2.0 * np.exp(0.2 * nodes[:, 0]), 0.05, 1.5, 0.05, 30.0
     ).one_before_two

@@ -6,7 +6,6 @@ import xarray as xr
 from numpy.testing import assert_array_equal
 
 from per_obspy.config import Screening
-from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.flags import (
     elastic_ratios,
     joined_flags,
@@ -14,6 +13,7 @@ from per_obspy.screening.flags import (
     raised_by_pairs,
     raised_by_record,
 )
+from per_obspy.screening.meanings import FLAGS
 
 #: Two pairs that raise no flag.
 PLAIN = {

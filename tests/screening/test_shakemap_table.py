@@ -16,7 +16,8 @@ from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.reliability import sd_error
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.columns import FLAGS, ORDER
+from per_obspy.screening.columns import ORDER
+from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.shakemap import shakemap_rows
 
 

@@ -46,6 +46,7 @@ FROM_OUTLINES = ("longitude", "latitude", "area", "geometry")
 #: Results of one building in the risk table; a test compares them with the table's columns.
 RESULTS = (
     *("amplification", "amplification_exact", "contact_mass", "displacement_exact", "ductility"),
+    "elastic_ratio",
     *("ln_per_ratio", "ln_per_std", "per", "sd"),
 )
 

@@ -39,7 +39,7 @@ from per_obspy.report.style import BUILDING_COLOURS, UNKNOWN_COLOUR, class_colou
 from per_obspy.report.tally import PairTally
 from per_obspy.report.texts import LANGUAGES, fixed_phrases
 from per_obspy.report.words import missing_gap, prevention_kind
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
 
 #: Columns of a pair on the page, and their kinds.

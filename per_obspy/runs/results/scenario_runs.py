@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
-from per_obspy.inventory.suspicions import ROW_SUSPICIONS
+from per_obspy.inventory.schema import ROW_SUSPICIONS
 from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import ROWS, table_files

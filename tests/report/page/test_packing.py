@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.report.page.packing import LONGEST_TEXT, encoded, pack_table
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.meanings import FLAGS
 
 KINDS = {"speed": "number", "longitude": "place", "state": "choice", "name": "text"}
 

@@ -99,7 +99,7 @@ def test_sensitivities_surround_the_probability(content, risk):
     assert content["sensitivity_counts"] == [60, 0]
     rows = [(int(rank), row) for rank, found in content["sensitivity"].items() for row in found]
     assert len(rows) > 50
-    uncertain = {"period_1", "period_2", "damping_1", "damping_2", "gap"}
+    uncertain = {"period_1", "period_2", "period_correlation", "damping_1", "damping_2", "gap"}
     assert {row[0] for _, row in rows} <= uncertain
     near = 0
     for rank, (name, low, high, *chances, _, _) in rows:
