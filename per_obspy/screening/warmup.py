@@ -112,21 +112,22 @@ def compile_screening() -> None:
     risk_table(_station(), checked_pairs(PAIRS, "none"))
 
 
-#: Parts that processes compile next to each other, the longest first; `compile_screening` then
-#: compiles what is left.
+#: Parts in the order in which two processes take them: the first one is busy with histories, which
+#: screening calls, until the other has done what else screening calls.
 PARTS: dict[str, Callable[[], None]] = {
     "histories": _histories,
     "relative": _relative,
     "spectra": _spectra,
+    "screening": compile_screening,
 }
 
 
 def compile_part(name: str) -> str:
-    """Compile one of `PARTS`, or everything that screening needs, and return its name."""
+    """Compile one of `PARTS` and return its name."""
     # Compilation makes many objects and few cycles: searches for them free next to nothing
     gc.disable()
     try:
-        PARTS.get(name, compile_screening)()
+        PARTS[name]()
         gc.freeze()
     finally:
         gc.enable()

@@ -1,7 +1,5 @@
 """Compilation of all kernels in processes, so that no later command waits for them."""
 
-from collections.abc import Iterator
-
 from per_obspy.errors import Unfinished, WriteError
 from per_obspy.kernels._jit import can_be_stored
 from per_obspy.progress import Progress
@@ -11,9 +9,8 @@ from per_obspy.screening.warmup import PARTS, compile_part
 #: Stage of the progress.
 COMPILING = "compiling kernels (once, one to two minutes)"
 
-#: Part that is compiled last: the kernels that only whole tables reach, which call those of the
-#: other parts.
-LAST = ("screening",)
+#: Processes: more would compile the kernels of histories twice, and end no earlier.
+PROCESSES = 2
 
 
 def compile_kernels(progress: Progress) -> None:
@@ -35,18 +32,11 @@ def compile_kernels(progress: Progress) -> None:
     if not can_be_stored():
         reason = "set NUMBA_CACHE_DIR to a folder that can be written"
         raise WriteError("compiled kernels", reason)
-    total = len({*PARTS, *LAST})
-    progress(COMPILING, 0, total)
-    for done, _ in enumerate(_compiled(), start=1):
-        progress(COMPILING, done, total)
-
-
-def _compiled() -> Iterator[str]:
-    """Yield the names of the parts as they are compiled."""
-    work = Work(compile_part, _failed)
-    first = [name for name in PARTS if name not in LAST]
-    yield from results(first, work, Workers())
-    yield from results(LAST, work, Workers())
+    progress(COMPILING, 0, len(PARTS))
+    workers = Workers(min(PROCESSES, Workers().count))
+    parts = results(list(PARTS), Work(compile_part, _failed), workers)
+    for done, _ in enumerate(parts, start=1):
+        progress(COMPILING, done, len(PARTS))
 
 
 def _failed(name: str, reason: str) -> str:
