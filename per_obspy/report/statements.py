@@ -232,9 +232,6 @@ def sureness(results: Results) -> list[str]:
         said.append(texts["sure_distance"].format(value=results.written(distance, 1)))
     if not tally.yielding:
         said.append(texts["sure_elastic"])
-    # Ensembles have no configuration
-    if results.stem != "ensemble":
-        said.append(texts["sure_rank"])
     limit = speed_text(HARD, results.language)
     return [*said, texts["sure_hard"].format(limit=limit), texts["sure_nature"]]
 
