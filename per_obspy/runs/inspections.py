@@ -18,6 +18,9 @@ from per_obspy.inventory.footprints.layer_files import read_raw_layer
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.report.layers.inspections import CONTACTS, DAMAGES, INSPECTIONS
 
+#: Layers in which forms are saved.
+_SUFFIXES = (".gpkg", ".geojson", ".fgb")
+
 #: Fields without which a layer is no form.
 _NEEDED = ("pair_id", "contact", "gap")
 
@@ -53,6 +56,10 @@ def read_forms(file: Path) -> Answers:
     CatalogError
         If the file cannot be read, or its layer lacks a field of the form.
     """
+    # Other suffixes are of outlines
+    if file.suffix.lower() not in _SUFFIXES:
+        reason = f"unknown suffix {file.suffix!r}, expected one of {', '.join(_SUFFIXES)}"
+        raise CatalogError(str(file), reason)
     raw = read_raw_layer(file, INSPECTIONS if file.suffix.lower() == ".gpkg" else None)
     table = raw.attributes.to_pandas()
     # Other layers have pairs too

@@ -306,13 +306,6 @@ def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
     return np.where(is_near, one_node / 2.0, 0.0), 1.0 - share * one_node
 
 
-def node_demands(
-    station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
-) -> FloatArray:
-    """Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m."""
-    return _node_motion(_block(station, table, screening), nodes).demand
-
-
 def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
     """Return the motion at the site at nodes of both buildings, demands being medians."""
     sample = _sampled_buildings(block.table, nodes)

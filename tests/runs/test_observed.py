@@ -149,6 +149,10 @@ def test_files_that_are_no_forms_are_refused_before_anything_is_written(results,
         package.execute(
             "UPDATE gpkg_contents SET table_name = 'x' WHERE table_name = 'inspections'"
         )
+    table = tmp_path / "table.csv"
+    table.write_text("pair_id,contact,gap\n")
+    with pytest.raises(CatalogError, match=r"unknown suffix '.csv', expected one of .gpkg"):
+        observe(results, table, tmp_path / "seen")
     for file in (other, tmp_path / "missing.gpkg"):
         with pytest.raises(CatalogError, match=file.name):
             observe(results, file, tmp_path / "seen")

@@ -15,7 +15,6 @@ from per_obspy.records.text_table import read_columns
 from per_obspy.screening import exact_population
 from per_obspy.screening import population as estimated
 from per_obspy.screening.exact_population import (
-    node_demands,
     nodes_suffice,
     record_population,
     resolved_probability,
@@ -56,6 +55,12 @@ def _table(station, rows):
     return table
 
 
+def _demands(station, table, nodes):
+    """Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m."""
+    block = exact_population._block(station, table, Screening())
+    return exact_population._node_motion(block, nodes).demand
+
+
 @pytest.mark.real_data
 def test_equal_uncertain_periods_at_sct_pound(sct):
     # Monte Carlo of 4096 nodes with the same record: P = 1.000, 0.991, 0.977, 0.954; was 0 with
@@ -76,7 +81,7 @@ def test_nearly_equal_buildings_are_as_uncertain_as_they_are(sct):
     pair = {**EQUAL, "period_1": 0.5, "period_2": 0.52, "damping_1": np.nan, "damping_2": np.nan}
     motion = station_motion(sct)
     table = table_of(sct, [{**pair, "azimuth": 90.0}])
-    spread = np.log(node_demands(motion, table, NODES, Screening())[0]).std()
+    spread = np.log(_demands(motion, table, NODES)[0]).std()
     random, count = np.random.default_rng(6), 4000
     damping_1, damping_2 = 0.05 * np.exp(0.3 * random.normal(size=(2, count)))
     drawn = directional_relative_displacement(
@@ -199,7 +204,7 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     factor = np.exp(0.2 + motion_log_std * random.normal(size=count))
     pounds = random.choice(demand, count) * factor > _drawn_gap(0.3, 0.12, count, random)
     # standard error of 200 000 samples: 0.0011
-    demands = node_demands(record, at_site, nodes, Screening())
+    demands = _demands(record, at_site, nodes)
     found = chance_of_contact(demands, motion_log_std, at_site)
     assert_allclose(found[0], np.mean(pounds), atol=0.004)
 
@@ -235,7 +240,7 @@ def test_nothing_that_is_likely_enough_is_a_no(station):
 
 
 def test_certain_buildings_are_not_sampled(station, record, monkeypatch):
-    monkeypatch.setattr(exact_population, "node_demands", None)
+    monkeypatch.setattr(exact_population, "_node_motion", None)
     table = table_of(station, [EQUAL | {"period_2": 1.3, "gap": 0.01}])
     assert record_population(record, table, Screening())["probability"].tolist() == [1.0]
 
