@@ -56,19 +56,9 @@ def read_forms(file: Path) -> Answers:
     CatalogError
         If the file cannot be read, or its layer lacks a field of the form.
     """
-    # Other suffixes are of outlines
-    if file.suffix.lower() not in _SUFFIXES:
-        reason = f"unknown suffix {file.suffix!r}, expected one of {', '.join(_SUFFIXES)}"
-        raise CatalogError(str(file), reason)
-    raw = read_raw_layer(file, INSPECTIONS if file.suffix.lower() == ".gpkg" else None)
-    table = raw.attributes.to_pandas()
-    # Other layers have pairs too
-    for name in _NEEDED:
-        if name not in table:
-            reason = f"{name}: no such field, expected the form of {INSPECTIONS}"
-            raise CatalogError(str(file), reason)
+    numbers, table = _rows(file)
     answers = Answers([], [], len(table))
-    for number, row in zip(raw.numbers.tolist(), table.to_dict("records"), strict=True):
+    for number, row in zip(numbers, table.to_dict("records"), strict=True):
         form = _form(number, row)
         # A form that nobody opened has a pair, and no answer
         if not (form.contact or form.damage or _text(row["gap"])):
@@ -80,6 +70,22 @@ def read_forms(file: Path) -> Answers:
         else:
             answers.forms.append(form)
     return answers
+
+
+def _rows(file: Path) -> tuple[list[int], pd.DataFrame]:
+    """Return the numbers and the fields of the features of a layer of forms."""
+    # Other suffixes are of outlines
+    if file.suffix.lower() not in _SUFFIXES:
+        reason = f"unknown suffix {file.suffix!r}, expected one of {', '.join(_SUFFIXES)}"
+        raise CatalogError(str(file), reason)
+    raw = read_raw_layer(file, INSPECTIONS if file.suffix.lower() == ".gpkg" else None)
+    table = raw.attributes.to_pandas()
+    # Other layers have pairs too
+    for name in _NEEDED:
+        if name not in table:
+            reason = f"{name}: no such field, expected the form of {INSPECTIONS}"
+            raise CatalogError(str(file), reason)
+    return raw.numbers.tolist(), table
 
 
 def _form(number: int, row: dict[Any, Any]) -> Form:
