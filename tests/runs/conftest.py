@@ -8,6 +8,7 @@ import pytest
 from filelock import FileLock
 
 from per_obspy.runs.run import run
+from per_obspy.runs.tasks.worker_start import forked_workers
 
 from .small_run import InProcess, real_reports, write_configuration
 from .small_run import plain_figures as with_plain_figures
@@ -40,3 +41,10 @@ def small_run(tmp_path_factory) -> Path:
         if not (folder / "out" / "run.json").is_file():
             run(write_configuration(folder), executor=InProcess())
     return folder
+
+
+@pytest.fixture(scope="session")
+def forked() -> Iterator[None]:
+    """Fork workers from a server, as commands do: fresh ones load all libraries, seconds each."""
+    with forked_workers():
+        yield

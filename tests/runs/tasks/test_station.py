@@ -130,6 +130,7 @@ def test_an_earlier_station_is_found_by_its_status(make_jobs):
         earlier_station(station.shard.with_suffix(".json"))
 
 
+@pytest.mark.usefixtures("forked")
 def test_finished_stations_travel_to_other_processes(make_jobs):
     first = {station.station: station for station in finish(make_jobs(), Workers(2))}
     # the same job in this process
@@ -153,6 +154,7 @@ class Poison:
         return os._exit, (9,)
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
     batch = [empty_job(f"XX.S{number}", tmp_path) for number in range(4)]
     batch[2] = replace(batch[2], reader=partial(read_station, Poison()))
@@ -199,6 +201,7 @@ def test_a_key_that_cannot_be_computed_costs_its_own_station(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".nc", ".json"])
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_folder_in_the_place_of_a_station_file_is_no_property_of_the_station(
     make_jobs, suffix, workers
