@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test test-long workflows rehearsal check docs wheel benchmark extras constraints clean
+.PHONY: demo figures test test-uncompiled test-long test-all workflows rehearsal check docs wheel benchmark extras constraints clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -13,21 +13,32 @@ demo: .venv/run
 	@echo "== your own records and buildings (in a new shell first: source $(BIN)/activate, then per-obspy without its path):"
 	@echo "     $(BIN)/per-obspy run RECORDS PAIRS -o output/mine"
 
-figures: .venv/run
+# The figures of the README are those of the demonstration
+figures: demo
 	@echo "== redraw the paper's figures, on real records if PER_OBSPY_DATA or ../shared/data has them"
 	$(BIN)/python workflows/paper_figures.py
 	@echo "== redraw the figures of the README"
 	$(BIN)/python workflows/readme_figures.py
 
+# Tests on all processors; those of Snakemake are `make workflows`
+PYTEST := $(BIN)/python -m pytest -q -n auto --dist worksteal --ignore tests/workflows/test_snakefile.py
+
 test: .venv/test
 	@echo "== tests and doctests; make test-long and make workflows have the rest"
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not long" --ignore tests/workflows/test_snakefile.py
-	@echo "== the kernels' tests once more without the compiler"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist worksteal tests/kernels
+	$(PYTEST) -m "not long"
+	$(MAKE) --no-print-directory test-uncompiled
+
+test-uncompiled: .venv/test
+	@echo "== the kernels' tests once more without the compiler, which finds no index out of bounds"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -m "not compiled" tests/kernels
 
 test-long: .venv/test
 	@echo "== damaged copies of every format, killed runs and watchers, whole earthquakes, the blocks of README and docs"
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m long --ignore tests/workflows/test_snakefile.py tests
+	$(PYTEST) -m long tests
+
+test-all: .venv/test
+	@echo "== the tests of test and test-long, which take less time together"
+	$(PYTEST)
 
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"

@@ -7,12 +7,9 @@ from threading import Thread
 import numpy as np
 import pytest
 from filelock import FileLock
-from numba import config
 from numba.core import caching
 
 from per_obspy.kernels import _jit
-
-compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="kernels run uncompiled")
 
 DECORATORS = [_jit.kernel, _jit.lean, _jit.vectorised, _jit.inlined]
 
@@ -28,7 +25,7 @@ def test_nan_is_found(decorator):
     assert not is_nan(1.0)
 
 
-@compiled
+@pytest.mark.compiled
 @pytest.mark.parametrize("decorator", DECORATORS)
 def test_division_by_zero_gives_infinity(decorator):
     # would catch: Python's error model, which raises
@@ -39,7 +36,7 @@ def test_division_by_zero_gives_infinity(decorator):
     assert quotient(1.0, 0.0) == math.inf
 
 
-@compiled
+@pytest.mark.compiled
 @pytest.mark.parametrize("decorator", DECORATORS)
 def test_kernels_release_the_interpreter_and_are_stored(decorator):
     @decorator
@@ -67,7 +64,7 @@ def test_sums_keep_their_order():
     assert total(values) == expected
 
 
-@compiled
+@pytest.mark.compiled
 def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_warns(
     monkeypatch, caplog
 ):
@@ -87,7 +84,7 @@ def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_wa
     assert "\n" not in message
 
 
-@compiled
+@pytest.mark.compiled
 def test_code_that_names_a_module_of_an_earlier_version_is_compiled_again(monkeypatch):
     # catches an upgrade after which a command ends, because another file was taken out
     @_jit.kernel
@@ -101,7 +98,7 @@ def test_code_that_names_a_module_of_an_earlier_version_is_compiled_again(monkey
     assert fifth(5.0) == 1.0
 
 
-@compiled
+@pytest.mark.compiled
 @pytest.mark.parametrize("decorator", DECORATORS)
 def test_compiled_code_is_saved_by_one_process_at_a_time(decorator, monkeypatch):
     # catches two processes that save two signatures under one name: one of them is then loaded for

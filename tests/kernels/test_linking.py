@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from numba import config, types
+from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import TypingError
 
 from per_obspy.kernels import _jit, _linking
 
-pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="kernels run uncompiled")
+pytestmark = pytest.mark.compiled
 
 
 @_jit.inlined

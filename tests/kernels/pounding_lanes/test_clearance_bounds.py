@@ -116,6 +116,7 @@ class LinearPair:
         return self.pair, left, right, *inside[-1], self.share, STEP
 
 
+@pytest.mark.compiled
 def test_a_piece_that_just_closes_between_its_ends_does_not_stay_open():
     # catches: a rest that is too small or has the other sign, a control point too far in, a swing
     # of the rate that is too small
@@ -151,6 +152,7 @@ def dips(one, numbers):
     return True
 
 
+@pytest.mark.compiled
 def test_a_piece_that_closes_again_after_contact_does_not_stay_open():
     # catches: too little room after the contact, the rate at the start taken for that at the end
     random, again = np.random.default_rng(10), 0

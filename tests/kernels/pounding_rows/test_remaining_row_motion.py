@@ -54,6 +54,7 @@ def random_rows(rng, sizes):
     return rows
 
 
+@pytest.mark.compiled
 def test_rows_are_the_same_bits_as_through_the_whole_record(monkeypatch):
     # catches: a ground that is taken for quiet, an energy without a neighbour, a group with a gap
     rng = np.random.default_rng(21)

@@ -102,6 +102,7 @@ def _within_steps(phases, dampings, states, motion):
     return np.array(found)
 
 
+@pytest.mark.compiled
 def test_no_motion_within_one_stride_exceeds_the_bounds():
     # catches sums of |a| of one half of the strides, and a second derivative without one of its
     # terms: of many states and accelerations along one line some come close to the bounds
