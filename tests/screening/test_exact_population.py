@@ -224,6 +224,17 @@ def test_yielding_pairs_are_sampled_with_their_own_demand():
     assert chance[-1] < 0.01
 
 
+def test_a_history_without_impact_scales_no_velocity_of_the_other_nodes(station, record):
+    # catches: 0 m/s of a pair that just misses, taken for a share of the estimate, or 0 of that
+    pair = {**EQUAL, "period_2": 1.4, **AT_STATION, **DOUBT, "yield_displacement_1": 0.05}
+    table = table_of(station, [pair | {"gap": gap} for gap in (0.001, 0.001, 9.0)])
+    table = table.assign(demand_exact=0.1, impact_velocity_exact=[0.0, 1e-3, 1.0])
+    _, factor = exact_population._at_the_medians(
+        exact_population._block(record, table, Screening())
+    )
+    assert_array_equal(factor, [1.0, exact_population.SMALLEST_FACTOR, 1.0])
+
+
 def test_nothing_that_is_likely_enough_is_a_no(station):
     periods = np.linspace(0.5, 2.0, 12)
     # equal buildings, of which the exact demand is 0
