@@ -19,6 +19,11 @@ settings.load_profile("compiling")
 CHECKOUT = Path(__file__).parents[1]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes long: at the end all workers have something short to do."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """Folder of real records: PER_OBSPY_DATA, or ``shared/data`` next to the checkout."""
