@@ -110,9 +110,18 @@ def test_values_behind_a_trace_go_by_keyword(trace):
         per_obspy.per_spectrum(trace, dt=0.01, periods=PERIODS)
 
 
+@pytest.mark.parametrize("shift", [-0.004, 0.004])
+def test_clocks_that_differ_by_less_than_half_an_interval_are_one(trace, east, shift):
+    expected = per_obspy.azimuthal_per_spectrum(trace, east, periods=PERIODS)
+    east.stats.starttime = trace.stats.starttime + shift
+    found = per_obspy.azimuthal_per_spectrum(trace, east, periods=PERIODS)
+    np.testing.assert_array_equal(found, expected)
+
+
 def test_two_traces_belong_together(trace, east):
+    later = trace.stats.starttime + 0.006
     for mend, message in [
-        (lambda: setattr(east.stats, "starttime", east.stats.starttime + 1), "north starts at"),
+        (lambda: setattr(east.stats, "starttime", later), "north starts at"),
         (lambda: setattr(east, "data", east.data[1:]), "north has 60 samples of 0.01 s, east 59"),
     ]:
         east.stats.starttime = trace.stats.starttime
