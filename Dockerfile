@@ -7,7 +7,7 @@ FROM ${BASE}
 RUN useradd --uid 10001 --home-dir /var/cache/per-obspy --create-home per-obspy \
  && install -d -o per-obspy -g per-obspy /data /var/cache/per-obspy/numba
 ENV NUMBA_CACHE_DIR=/var/cache/per-obspy/numba MPLCONFIGDIR=/var/cache/per-obspy/matplotlib \
-    PATH=/opt/per-obspy/bin:$PATH PYTHONDONTWRITEBYTECODE=1
+    PATH=/opt/per-obspy/bin:$PATH PYTHONDONTWRITEBYTECODE=1 PIP_NO_CACHE_DIR=1
 
 COPY pyproject.toml README.md LICENSE /src/
 COPY per_obspy /src/per_obspy

@@ -17,7 +17,7 @@ install)
   extras=${EXTRAS-gis,notify}
   constraints=${CONSTRAINTS-$(dirname "$0")/constraints.txt}
   "${PYTHON:-python3}" -m venv "$3"
-  "$3/bin/python" -m pip install --quiet --disable-pip-version-check --no-cache-dir \
+  "$3/bin/python" -m pip install --quiet --disable-pip-version-check \
     ${constraints:+--constraint "$constraints"} "$2${extras:+[$extras]}"
   ;;
 compile)
