@@ -154,6 +154,7 @@ def test_fewer_pairs_are_one_file_again(copied):
     assert not (out / "risk").exists()
 
 
+@pytest.mark.usefixtures("forked")
 def test_results_do_not_depend_on_workers(copied, monkeypatch):
     before = results(copied)
     shutil.rmtree(copied / "out" / "rows")
