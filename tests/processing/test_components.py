@@ -315,7 +315,3 @@ def test_a_bridge_without_a_free_field_sensor_gives_no_ground_motion(real_data):
     best, rejected = process_station(stream, Processing())
     assert not best
     assert len(rejected) == len(stream) == 5
-
-
-def test_codes_that_are_azimuths_belong_to_one_instrument():
-    assert len(instruments(Stream([trace("090"), trace("360"), trace("UP")]))) == 1

@@ -61,6 +61,14 @@ def test_the_amplitude_of_a_pulse_is_its_integral():
     )
 
 
+def test_tapers_cover_a_twentieth_of_the_window_at_each_end():
+    # one impulse halfway up the first taper, the other at the end, where the last one is zero
+    samples = np.zeros(2000 + 4001)
+    samples[[2100, -1]] = 1.0
+    spectra = noise_spectra(samples, DT, 20.0, BANDWIDTH)
+    assert_allclose(spectra.signal, 0.5 * DT, rtol=1e-9)
+
+
 def test_the_signal_ends_with_95_percent_of_its_energy():
     assert significant_samples(np.ones(1000)) == 950
 
