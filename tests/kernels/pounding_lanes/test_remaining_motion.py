@@ -110,7 +110,6 @@ def test_equal_structures_with_one_state_move_as_one():
     assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
 
 
-@pytest.mark.compiled
 def test_equal_structures_that_touch_are_the_same_bits_as_through_the_whole_record(monkeypatch):
     # catches: rounding that sets equal structures apart
     rng = np.random.default_rng(3)
