@@ -1,5 +1,6 @@
 """Every file of a finished run that was damaged is made again, or named in one line."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -58,9 +59,12 @@ def finished(tmp_path_factory):
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return every result of a run by its name."""
+    """Return every result of a run by its name, without the minute at which it was issued."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+    return {
+        path.relative_to(folder).as_posix(): re.sub(rb"\nIssued [^\n]*", b"", path.read_bytes())
+        for path in files
+    }
 
 
 def test_the_list_of_files_is_that_of_a_run(finished):
