@@ -233,9 +233,9 @@ def run_lanes(kind, record, lanes, flags, grounds, memory, firsts, cosine, sine,
     memory : tuple of ndarray
         Room for lines of lanes (n_buildings * STRUCTURE_ROWS,); lines of all buildings
         (n_buildings, ROW_COLUMNS) at rest, then at the end, see `motion` for the columns; logs
-        (n_rows, n_lines, LOG_COLUMNS), which receive one line per impact that may count; deferred tiles (n_buildings, DEFERRED_COLUMNS), zero at the start; room for
-        the states of a row (n_buildings, STATE_COLUMNS) and a window (WINDOW_SIZE,), zero at the
-        start, for ROWS only.
+        (n_rows, n_lines, LOG_COLUMNS), which receive one line per impact that may count; deferred
+        tiles (n_buildings, DEFERRED_COLUMNS), zero at the start; room for the states of a row
+        (n_buildings, STATE_COLUMNS) and a window (WINDOW_SIZE,), zero at the start, for ROWS only.
     firsts : (n_rows + 1,) ndarray of int
         First building of each row, then the number of buildings.
     cosine, sine : (n_rows,) ndarray

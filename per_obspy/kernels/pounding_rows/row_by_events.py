@@ -57,7 +57,8 @@ def run_row_by_events(north, east, cosine, sine, dt, refinement, row, log, free_
         Row at rest, then at the end; see `motion` for its columns. It holds the results:
         LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and APPROACH (m/s).
     log : (n_lines, LOG_COLUMNS) ndarray
-        Receives one line per impact; the run ends where there is no room; see `contact` for its columns.
+        Receives one line per impact; the run ends where there is no room. See `contact` for its
+        columns.
     free_steps : int
         Sampling intervals of free vibration at most.
 
