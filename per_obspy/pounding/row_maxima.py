@@ -180,7 +180,7 @@ def run_logged_block(
         is_through = run(record, own, logs, firsts, direction, free.copy())
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
         # A run ends where a log is full
-        room = logs.shape[1]
+        room: int = logs.shape[1]
         if impacts > room >= MOST_IMPACTS:
             raise RuntimeError(f"a row has more than {MOST_IMPACTS} impacts that may count")
         if impacts > room:
