@@ -67,24 +67,17 @@ RING, CUT, BENT = 1, 2, 4
 
 
 class Joints(NamedTuple):
-    """
-    Joined ends of contacts.
+    """Joined ends of contacts."""
 
-    Attributes
-    ----------
-    joined : (2 * n_pairs,) ndarray of int
-        The end to which each end is joined, -1 if to none.
-    forks, contradictory, crowded : (n,) ndarray of int
-        Numbers of buildings with more contacts on a side than a row has; whose pairs contradict
-        each other, so that they are not joined there; with too many contacts to be one building.
-    rejected : list of OrderedRejection
-        One for each crowded building and each contradiction.
-    """
-
+    #: The end to which each end is joined, -1 if to none. Shape (2 * n_pairs,).
     joined: IntArray
+    #: Numbers of buildings with more contacts on a side than a row has; whose pairs contradict each
+    #: other, so that they are not joined there; with too many contacts to be one building. Shape
+    #: (n,).
     forks: IntArray
     contradictory: IntArray
     crowded: IntArray
+    #: One for each crowded building and each contradiction.
     rejected: list[OrderedRejection]
 
 
@@ -219,28 +212,18 @@ def _contradiction(
 
 
 class Chains(NamedTuple):
-    """
-    Rows of contacts.
+    """Rows of contacts."""
 
-    Attributes
-    ----------
-    pair : (n_contacts,) ndarray of int
-        Pairs in the order of the rows, and within each along its axis.
-    turned : (n_contacts,) ndarray of bool
-        Whether building 2 of the pair comes before building 1 along the axis.
-    first : (n_rows + 1,) ndarray of int
-        Place of the first contact of each row, and the end.
-    azimuth : (n_rows,) ndarray
-        Of the axis from the first building to the last, from 0 to below 180 degrees; NaN if
-        unknown.
-    flags : dict of str to (n_rows,) ndarray of bool
-        By the names of ``ROW_FLAGS``.
-    """
-
+    #: Pairs in the order of the rows, and within each along its axis. Shape (n_contacts,).
     pair: IntArray
+    #: Whether building 2 of the pair comes before building 1 along the axis. Shape (n_contacts,).
     turned: BoolArray
+    #: Place of the first contact of each row, and the end. Shape (n_rows + 1,).
     first: IntArray
+    #: Of the axis from the first building to the last, from 0 to below 180 degrees; NaN if unknown.
+    #: Shape (n_rows,).
     azimuth: FloatArray
+    #: By the names of ``ROW_FLAGS``. Shape (n_rows,).
     flags: dict[str, BoolArray]
 
 

@@ -42,47 +42,33 @@ OrderedRejection = tuple[tuple[int, ...], Rejection]
 
 
 class Contacts(NamedTuple):
-    """
-    Pairs as contacts between numbered buildings.
+    """Pairs as contacts between numbered buildings."""
 
-    Attributes
-    ----------
-    buildings : (n_pairs, 2) ndarray of int
-        Numbers of buildings 1 and 2 from 0, in the order of their identifiers; behind these
-        the buildings that belong to one pair only.
-    codes : (n_pairs, 2) ndarray of int
-        Numbers of the identifiers in the whole table; -1 for a building of one pair only.
-    names : tuple of two (n_pairs,) ChunkedArray of str
-        Identifiers of buildings 1 and 2; ``PAIR#1`` and ``PAIR#2`` are those of a pair without.
-    azimuth : (n_pairs,) ndarray
-        From building 1 to 2, degrees; NaN if unknown.
-    gap, facing_length : (n_pairs,) ndarray
-        m; NaN where the gap is unknown, 0 where the facing length is.
-    derived : Derived
-        Columns that the table does not give.
-    pair_id : (n_pairs,) ChunkedArray of str
-        Identifiers of the pairs.
-    order : (n_pairs,) ndarray of int
-        Place of each identifier in their alphabetical order, by which ties are broken.
-    repeated : (n_pairs,) ndarray of bool
-        Whether another pair describes the same contact.
-    ambiguous : (n_pairs,) ndarray of bool
-        Whether an identifier of the pair belongs to buildings at different places.
-    rejected : list of OrderedRejection
-        One for each ambiguous identifier and each repeated contact.
-    """
-
+    #: Numbers of buildings 1 and 2 from 0, in the order of their identifiers; behind these the
+    #: buildings that belong to one pair only. Shape (n_pairs, 2).
     buildings: IntArray
+    #: Numbers of the identifiers in the whole table; -1 for a building of one pair only. Shape
+    #: (n_pairs, 2).
     codes: IntArray
+    #: Identifiers of buildings 1 and 2; ``PAIR#1`` and ``PAIR#2`` are those of a pair without.
     names: tuple[pa.ChunkedArray, pa.ChunkedArray]
+    #: From building 1 to 2, degrees; NaN if unknown. Shape (n_pairs,).
     azimuth: FloatArray
+    #: m; NaN where the gap is unknown, 0 where the facing length is. Shape (n_pairs,).
     gap: FloatArray
     facing_length: FloatArray
+    #: Columns that the table does not give.
     derived: "Derived"
+    #: Identifiers of the pairs.
     pair_id: pa.ChunkedArray
+    #: Place of each identifier in their alphabetical order, by which ties are broken. Shape
+    #: (n_pairs,).
     order: IntArray
+    #: Whether another pair describes the same contact. Shape (n_pairs,).
     repeated: BoolArray
+    #: Whether an identifier of the pair belongs to buildings at different places. Shape (n_pairs,).
     ambiguous: BoolArray
+    #: One for each ambiguous identifier and each repeated contact.
     rejected: list[OrderedRejection]
 
 

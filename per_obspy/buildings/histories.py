@@ -93,22 +93,14 @@ def _amplification(maxima: RowMaxima) -> NDArray[np.float64]:
 
 
 class Members(NamedTuple):
-    """
-    Buildings of many rows, row after row.
+    """Buildings of many rows, row after row."""
 
-    Attributes
-    ----------
-    rows : BuildingRows
-        Their oscillators and interfaces.
-    left, right : (n_contacts,) ndarray of int
-        Numbers of the buildings on both sides of each contact.
-    reconciled : (n_contacts,) ndarray of bool
-        Whether two descriptions of a building next to the contact differ.
-    """
-
+    #: Their oscillators and interfaces.
     rows: BuildingRows
+    #: Numbers of the buildings on both sides of each contact. Shape (n_contacts,).
     left: IntArray
     right: IntArray
+    #: Whether two descriptions of a building next to the contact differ. Shape (n_contacts,).
     reconciled: BoolArray
 
 

@@ -93,26 +93,17 @@ _ENDS = pa.schema([("end", pa.int64()), ("name", pa.string())])
 
 
 class AllRows(NamedTuple):
-    """
-    Result of the search for rows.
+    """Result of the search for rows."""
 
-    Attributes
-    ----------
-    file : Path
-        Parquet file of the contacts in their order of computation, by station and name of the row:
-        columns of the pairs, of the rows, and of the buildings on both sides.
-    contacts, rows : int
-        Numbers of contacts and of rows.
-    rejected : tuple of Rejection
-        Contradictions and repeated contacts.
-    served : mapping of str to int
-        Number of buildings in whose pairs the record of each station is used.
-    """
-
+    #: Parquet file of the contacts in their order of computation, by station and name of the row:
+    #: columns of the pairs, of the rows, and of the buildings on both sides.
     file: Path
+    #: Numbers of contacts and of rows.
     contacts: int
     rows: int
+    #: Contradictions and repeated contacts.
     rejected: tuple[Rejection, ...]
+    #: Number of buildings in whose pairs the record of each station is used.
     served: Mapping[str, int]
 
 
@@ -262,24 +253,16 @@ def _pieces(database: duckdb.DuckDBPyConnection) -> Iterator[pa.Table]:
 
 
 class PieceRows(NamedTuple):
-    """
-    Rows of buildings of a piece of the risk table.
+    """Rows of buildings of a piece of the risk table."""
 
-    Attributes
-    ----------
-    rows : int
-        Number of rows.
-    own : (n,) ndarray of int
-        Ends of pairs (2 · (rank - 1), + 1 at building 2) whose building belongs to the pair only.
-    served : Counter of str
-        Number of buildings in whose pairs the record of each station is used.
-    rejected : list of OrderedRejection
-        Contradictions and repeated contacts.
-    """
-
+    #: Number of rows.
     rows: int
+    #: Ends of pairs (2 · (rank - 1), + 1 at building 2) whose building belongs to the pair only.
+    #: Shape (n,).
     own: IntArray
+    #: Number of buildings in whose pairs the record of each station is used.
     served: Counter[str]
+    #: Contradictions and repeated contacts.
     rejected: list[OrderedRejection]
 
 
@@ -472,16 +455,7 @@ def tables_of(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Ite
 
 
 def whole_groups(tables: Iterable[pa.Table], name: str) -> Iterator[pa.Table]:
-    """
-    Yield the rows of tables cut only where a number changes.
-
-    Parameters
-    ----------
-    tables : iterable of Table
-        At least one, none of them empty.
-    name : str
-        Column of the numbers, which never fall.
-    """
+    """Yield the rows of tables cut only where a number changes."""
     waiting = list[pa.Table]()
     for table in tables:
         number = table[name].to_numpy()

@@ -219,10 +219,10 @@ def _prevention(sides: Sides, neighbour: pd.Series) -> dict[str, FloatArray | ND
     missing, hit = measures["missing_gap"], sides.largest(sides["impact_velocity"]) > 0.0
     sentences = np.select([np.isnan(missing), hit], [MEASURE, ELSEWHERE], NOTHING).astype(object)
     # Buildings that need a measure have sentences of their own
-    for place in np.flatnonzero(missing > 0.0).tolist():
-        gap, damping, bumper = (float(column[place]) for column in measures.values())
-        name = str(neighbour.iloc[place])
-        sentences[place] = measures_sentence(gap, damping, bumper, name)
+    places = np.flatnonzero(missing > 0.0)
+    names = neighbour.to_numpy(object)[places].tolist()
+    needed = [column[places].tolist() for column in measures.values()]
+    sentences[places] = [measures_sentence(*one) for one in zip(*needed, names, strict=True)]
     return {"prevention": sentences, **measures}
 
 

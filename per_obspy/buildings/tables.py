@@ -177,16 +177,14 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
         for group in range(first.num_row_groups):
             table = first.read_row_group(group, columns=list(_OF_ROWS), use_threads=False)
             pairs = second.read_row_group(group, columns=carried, use_threads=False)
-            columns = directions(table["azimuth"], table["flags"])
+            names = [name for name in _OF_ROWS if name not in ("longitude", "latitude")]
+            columns = {name: table[name] for name in names}
+            columns |= directions(table["azimuth"], table["flags"])
             columns["area"] = _areas(table, pairs, totals)
             # Columns that the pair table does not have are empty
-            for name in OF_PAIRS:
-                empty = pa.nulls(pairs.num_rows, pa.float64())
-                columns[name] = pairs[name] if name in carried else empty
-            table = table.drop_columns(["longitude", "latitude"])
-            for name, column in columns.items():
-                table = table.append_column(name, pa.array(column))
-            yield table
+            empty = pa.nulls(pairs.num_rows, pa.float64())
+            columns |= {name: pairs[name] if name in carried else empty for name in OF_PAIRS}
+            yield pa.table(columns)
 
 
 def _areas(table: pa.Table, pairs: pa.Table, totals: Totals) -> pa.Array:

@@ -51,8 +51,8 @@ from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]
 
-#: Impacts of a row that may count for which there is room at first.
-FIRST_ROOM = 1 << 14
+#: Impacts of a row that may count for which there is room at first, and factor of more room.
+FIRST_ROOM, MORE_ROOM = 1 << 14, 16
 
 #: Impacts of a row that may count at most: their log takes 300 MB. Touching rows whose masses
 #: differ by a factor of a million have more.
@@ -177,11 +177,16 @@ def run_logged_block(
     def fill(logs: FloatArray) -> int:
         """Run the block from rest; the kernels change the lines and the steps of free vibration."""
         own[:] = start
-        if not run(record, own, logs, firsts, direction, free.copy()):
-            raise RuntimeError("no end of events in a step of a row")
+        is_through = run(record, own, logs, firsts, direction, free.copy())
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
-        if impacts > MOST_IMPACTS:
-            raise RuntimeError(f"a row has {impacts} impacts that may count, most {MOST_IMPACTS}")
+        # A run ends where a log is full
+        room: int = logs.shape[1]
+        if impacts > room >= MOST_IMPACTS:
+            raise RuntimeError(f"a row has more than {MOST_IMPACTS} impacts that may count")
+        if impacts > room:
+            return min(MORE_ROOM * room, MOST_IMPACTS)
+        if not is_through:
+            raise RuntimeError("no end of events in a step of a row")
         return impacts
 
     # Most impacts of a row decide on the room of all

@@ -93,24 +93,15 @@ def kind_of(reasons: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class Search:
-    """
-    Account of a search for neighbours in outlines.
+    """Account of a search for neighbours in outlines."""
 
-    Attributes
-    ----------
-    pairs : int
-        Pairs in its table.
-    left_out : mapping of str to int
-        Neighbours that are not in the table, by kind, most first.
-    buildings : mapping of str to int
-        Features of the layer that are no usable building, by kind, most first.
-    areas : list of (str, int)
-        Areas with most neighbours left out.
-    """
-
+    #: Pairs in its table.
     pairs: int = 0
+    #: Neighbours that are not in the table, by kind, most first.
     left_out: Mapping[str, int] = field(default_factory=dict)
+    #: Features of the layer that are no usable building, by kind, most first.
     buildings: Mapping[str, int] = field(default_factory=dict)
+    #: Areas with most neighbours left out.
     areas: Sequence[tuple[str, int]] = ()
 
     @property
@@ -130,25 +121,16 @@ class Search:
 
 @dataclass(frozen=True)
 class Coverage:
-    """
-    Rows of the pair tables of a screening, and those that have a verdict.
+    """Rows of the pair tables of a screening, and those that have a verdict."""
 
-    Attributes
-    ----------
-    rows, screened : int
-        Rows of the pair tables, and those in the table of results.
-    left_out : mapping of str to int
-        The others by kind of their reason, most first.
-    areas : list of (str, int)
-        Areas with most rows left out, as far as their coordinates are known.
-    search : Search or None
-        The search that made the pair table; None if no account is at hand.
-    """
-
+    #: Rows of the pair tables, and those in the table of results.
     rows: int
     screened: int
+    #: The others by kind of their reason, most first.
     left_out: Mapping[str, int] = field(default_factory=dict)
+    #: Areas with most rows left out, as far as their coordinates are known.
     areas: Sequence[tuple[str, int]] = ()
+    #: The search that made the pair table; None if no account is at hand.
     search: Search | None = None
 
     @property

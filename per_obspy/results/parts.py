@@ -90,13 +90,6 @@ def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) ->
 
     Databases take signs such as ``[``, ``*`` and ``?`` in a path for wildcards, and would read
     other files than these.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        All with these columns in the same types.
-    columns : sequence of str, optional
-        All of the first file if not given.
     """
     schema = pq.read_schema(files[0].absolute())
     if columns is not None:

@@ -27,13 +27,6 @@ def table_files(folder: Path, name: str = "risk") -> list[Path]:
     """
     Return the files of a ranked table in a folder of results.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    name : str
-        Of the table.
-
     Returns
     -------
     files : list of Path

@@ -35,22 +35,13 @@ from per_obspy.screening.design import DESIGN
 
 
 class RiskFiles(NamedTuple):
-    """
-    Files of a risk table.
+    """Files of a risk table."""
 
-    Attributes
-    ----------
-    files : list of Path
-        ``risk.parquet``, or one file per cell in ``risk/``; ``risk.csv`` and
-        ``risk.columns.csv``.
-    states : Counter
-        Number of pairs in each state.
-    stations : Counter
-        Number of pairs for which the record of each station is used.
-    """
-
+    #: ``risk.parquet``, or one file per cell in ``risk/``; ``risk.csv`` and ``risk.columns.csv``.
     files: list[Path]
+    #: Number of pairs in each state.
     states: Counter[str]
+    #: Number of pairs for which the record of each station is used.
     stations: Counter[str]
 
 

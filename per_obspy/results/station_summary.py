@@ -83,18 +83,11 @@ ONE_HORIZONTAL = "one_horizontal"
 
 
 class StationSummary(NamedTuple):
-    """
-    Paths of the station table, and names of the stations by warning.
+    """Paths of the station table, and names of the stations by warning."""
 
-    Attributes
-    ----------
-    files : list of Path
-        ``stations.csv`` and ``stations.columns.csv``.
-    warnings : dict
-        Flag -> names of the used stations that have it.
-    """
-
+    #: ``stations.csv`` and ``stations.columns.csv``.
     files: list[Path]
+    #: Flag -> names of the used stations that have it.
     warnings: dict[str, list[str]]
 
 
@@ -104,16 +97,7 @@ def write_stations(
     pairs: Mapping[str, int],
     folder: Path,
 ) -> StationSummary:
-    """
-    Write ``stations.csv`` and ``stations.columns.csv``; see :func:`station_table`.
-
-    Parameters
-    ----------
-    spectra, rejected, pairs
-        As for :func:`station_table`.
-    folder : Path
-        The file.
-    """
+    """Write ``stations.csv`` and ``stations.columns.csv``; see :func:`station_table`."""
     table = station_table(spectra, rejected, pairs)
     text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
     write_csv(rounded_table(table, own=table.columns), text)
@@ -142,11 +126,6 @@ def station_table(
         Rejections; those of files, services and pairs are passed over.
     pairs : mapping
         Station -> number of pairs for which its record is used.
-
-    Returns
-    -------
-    DataFrame
-        With the columns of ``COLUMNS``.
     """
     reasons = _reasons(rejected)
     rows = {name: _row(station, pairs) for name, station in _named(spectra).items()}

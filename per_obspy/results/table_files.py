@@ -73,21 +73,7 @@ def write_described(columns: Iterable[Column], path: Path) -> None:
 
 
 def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:
-    """
-    Write one row per rejection, its reasons separated by semicolons.
-
-    Parameters
-    ----------
-    rejected : iterable of Rejection
-        Taken one by one.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Counter
-        Number of rows of each kind.
-    """
+    """Write one row per rejection, its reasons separated by semicolons."""
     kinds: Counter[str] = Counter()
     with written_whole(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
@@ -165,16 +151,7 @@ def rounded_table(table: pd.DataFrame, own: Collection[str] = ()) -> pd.DataFram
 
 
 def rounded_arrow(table: pa.Table, own: Collection[str] = ()) -> pa.Table:
-    """
-    Return a table whose known columns of numbers are rounded; empty cells stay empty.
-
-    Parameters
-    ----------
-    table : Table
-        It stays as it is.
-    own : collection of str
-        As for :func:`rounded_table`.
-    """
+    """Return a table whose known columns of numbers are rounded; empty cells stay empty."""
     for position, field in enumerate(table.schema):
         if not pa.types.is_floating(field.type) or not _is_own(field.name, own):
             continue

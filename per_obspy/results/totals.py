@@ -47,35 +47,21 @@ PLACE = "place"
 
 
 class RegionTotals(NamedTuple):
-    """
-    Totals of a region.
+    """Totals of a region."""
 
-    Attributes
-    ----------
-    table : DataFrame
-        One row per area: see :func:`per_obspy.screening.totals.totals`.
-    outlines : list of ndarray or None
-        Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
-        if an area has a name, whose outline is unknown.
-    """
-
+    #: One row per area: see :func:`per_obspy.screening.totals.totals`.
     table: pd.DataFrame
+    #: Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
+    #: if an area has a name, whose outline is unknown.
     outlines: list[FloatArray] | None
 
 
 class PieceTotals(NamedTuple):
-    """
-    Totals of a piece of the risk table.
+    """Totals of a piece of the risk table."""
 
-    Attributes
-    ----------
-    totals : PartialTotals
-        By area.
-    boxes : mapping of str to ndarray
-        Corners of the grid's cells; empty for other areas.
-    """
-
+    #: By area.
     totals: PartialTotals
+    #: Corners of the grid's cells; empty for other areas.
     boxes: Mapping[str, FloatArray] = MappingProxyType({})
 
 
@@ -213,16 +199,7 @@ def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
 
 
 def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTotals:
-    """
-    Join the totals of the pieces of a risk table.
-
-    Parameters
-    ----------
-    pieces : iterable of PieceTotals
-        From :func:`piece_totals`, at least one.
-    settings : Totals
-        The same as of the pieces.
-    """
+    """Join the totals of the pieces of a risk table."""
     counted = _joined(list(pieces))
     table = joined_totals([counted.totals])
     if settings.area:

@@ -22,27 +22,17 @@ from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 
 
 class BuildingRowsDone(NamedTuple):
-    """
-    Result of the rows of buildings.
+    """Result of the rows of buildings."""
 
-    Attributes
-    ----------
-    outputs : list of Path
-        The files; none where rows are not enabled.
-    counts : dict
-        Rows, buildings, and chunks that an earlier run had done.
-    rejected : tuple of Rejection
-        Contradictions, repeated contacts and rows that could not be followed.
-    failed : bool
-        Whether the work of a chunk failed unexpectedly.
-    served : mapping of str to int
-        Number of buildings in whose pairs the record of each station is used.
-    """
-
+    #: The files; none where rows are not enabled.
     outputs: list[Path]
+    #: Rows, buildings, and chunks that an earlier run had done.
     counts: dict[str, int]
+    #: Contradictions, repeated contacts and rows that could not be followed.
     rejected: tuple[Rejection, ...] = ()
+    #: Whether the work of a chunk failed unexpectedly.
     failed: bool = False
+    #: Number of buildings in whose pairs the record of each station is used.
     served: Mapping[str, int] = MappingProxyType({})
 
 

@@ -52,21 +52,13 @@ _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
 
 class Scenarios(NamedTuple):
-    """
-    Scenarios whose runs are done.
+    """Scenarios whose runs are done."""
 
-    Attributes
-    ----------
-    tables : dict
-        Files of the risk table of each; none for a scenario without a usable pair.
-    weights : dict
-        Weight of each, or its rate (1/year).
-    yearly : bool
-        Whether they are rates.
-    """
-
+    #: Files of the risk table of each; none for a scenario without a usable pair.
     tables: Mapping[str, Sequence[Path]]
+    #: Weight of each, or its rate (1/year).
     weights: dict[str, float]
+    #: Whether they are rates.
     yearly: bool
 
 
@@ -99,13 +91,6 @@ def write_ensemble(
         Facts of the whole table that the Parquet file states.
     csv_rows : int
         Number of rows of ``ensemble.csv``, the worst ones.
-
-    Returns
-    -------
-    files : list of Path
-        Their paths.
-    counts : dict
-        Number of pairs, and of rejected ones.
     """
     names = ("ensemble.parquet", "ensemble.csv", "ensemble.columns.csv", "rejected.csv")
     table, text, columns, rejected = files = [folder / name for name in names]

@@ -25,11 +25,6 @@ def number_of_rows(record: Path) -> int | None:
     """
     Return the number of rows of the pair tables by ``run.json`` of the run before.
 
-    Parameters
-    ----------
-    record : Path
-        ``run.json`` of an earlier run.
-
     Returns
     -------
     int or None

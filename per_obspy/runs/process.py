@@ -32,21 +32,13 @@ STATIONS, STRUCTURES = "stations", "structures"
 
 
 class Processed(NamedTuple):
-    """
-    Result of processing the records of some sources.
+    """Result of processing the records of some sources."""
 
-    Attributes
-    ----------
-    done : list of FinishedStation
-        Every station, sorted by name.
-    rejected : tuple of Rejection
-        Rejected inputs, each with its reasons.
-    files : tuple of Path
-        Every file for the user to read.
-    """
-
+    #: Every station, sorted by name.
     done: list[FinishedStation]
+    #: Rejected inputs, each with its reasons.
     rejected: tuple[Rejection, ...]
+    #: Every file for the user to read.
     files: tuple[Path, ...]
 
 
@@ -77,10 +69,6 @@ def process_records(
         Whether to draw ``stations/NET.STA.pdf`` as well, one page per record.
     workers : Workers
         Where to work.
-
-    Returns
-    -------
-    Processed
 
     Raises
     ------
@@ -191,13 +179,6 @@ def spectra_of(
     workers : Workers
         Where to work.
 
-    Returns
-    -------
-    done : list of FinishedStation
-        Every station, sorted by name.
-    rejected : tuple of Rejection
-        Rejected inputs, each with its reasons.
-
     Raises
     ------
     CatalogError
@@ -230,11 +211,6 @@ def plot_station(shard: Path, damping: float, period: float, folder: Path) -> tu
         Of the oscillator, fraction of critical; s.
     folder : Path
         Where the two PNG files go.
-
-    Returns
-    -------
-    spectra, state_space : Path
-        The files.
     """
     station = read_spectra(shard)
     # The name of the station file lacks the dot of a missing network, which would hide it

@@ -22,85 +22,57 @@ from per_obspy.runs.tasks.executor import engine_facts
 
 @dataclass(frozen=True, kw_only=True)
 class RunRecord:
-    """
-    Content of ``run.json`` by its keys; values of stages that have not begun are None.
+    """Content of ``run.json`` by its keys; values of stages that have not begun are None."""
 
-    Attributes
-    ----------
-    name, state : str
-        Title of the run; ``unfinished``, ``complete``, or ``nothing_usable`` without any pair.
-    stage : str
-        Stage of an unfinished run.
-    earlier_rows : int
-        Rows of the pair tables in the run before, of an unfinished run.
-    partial, failed : bool
-        Whether anything is rejected; whether some work failed, so that the next run does it again.
-    counts : mapping of str to int
-        Stations, pairs, states, rejections, chunks and rows.
-    faults : list of str
-        Figures and layers that could not be made.
-    alert : str
-        Level and sentence of the result.
-    engine : dict
-        Workers and events of a cluster.
-    simulated : bool
-        Whether any motion is simulated.
-    warnings : dict
-        Flag -> names of the used stations that have it.
-    pair_tables, coverage : dict
-        Sentences on the pair tables; their rows, and those that are left out.
-    versions : dict
-        Version of every library on which results depend.
-    seconds : dict of str to float
-        Time of each stage.
-    earthquakes : list of dict
-        Facts of every earthquake of the records.
-    trusted : dict
-        Trusted stations, see ``ComparedStations``.
-    stations : dict
-        See :func:`station_facts`.
-    intermediate : dict of str to str
-        Hashes of the files of the first stage.
-    started : str
-        Time, ISO 8601, UTC.
-    drawn : dict of str to int
-        Numbers of pairs and rejections of a search in footprints.
-    losses : list of str
-        Sentences on rows that are lost.
-    configuration, inputs : dict
-        Settings; hash of every input file.
-    outputs : dict of str to str
-        Hash of every file of the results.
-    facts : mapping
-        Further plain values, which change no result.
-    """
-
+    #: Title of the run; ``unfinished``, ``complete``, or ``nothing_usable`` without any pair.
     name: str
     state: str = UNFINISHED
+    #: Stage of an unfinished run.
     stage: str | None = None
+    #: Rows of the pair tables in the run before, of an unfinished run.
     earlier_rows: int | None = None
+    #: Whether anything is rejected; whether some work failed, so that the next run does it again.
     partial: bool | None = None
     failed: bool | None = None
+    #: Stations, pairs, states, rejections, chunks and rows.
     counts: Mapping[str, int] | None = None
+    #: Figures and layers that could not be made.
     faults: Sequence[str] | None = None
+    #: Level and sentence of the result.
     alert: str | None = None
+    #: Workers and events of a cluster.
     engine: Mapping[str, Any] | None = None
+    #: Whether any motion is simulated.
     simulated: bool | None = None
+    #: Flag -> names of the used stations that have it.
     warnings: Mapping[str, Sequence[str]] | None = None
+    #: Sentences on the pair tables; their rows, and those that are left out.
     pair_tables: Mapping[str, Any] | None = None
     coverage: Mapping[str, Any] | None = None
+    #: Version of every library on which results depend.
     versions: Mapping[str, str] | None = None
+    #: Time of each stage.
     seconds: dict[str, float] = field(default_factory=dict)
+    #: Facts of every earthquake of the records.
     earthquakes: Sequence[Any] = ()
+    #: Trusted stations, see ``ComparedStations``.
     trusted: Mapping[str, Sequence[str]] | None = None
+    #: See :func:`station_facts`.
     stations: Mapping[str, Any] | None = None
+    #: Hashes of the files of the first stage.
     intermediate: Mapping[str, str] | None = None
+    #: Time, ISO 8601, UTC.
     started: str = field(default_factory=now)
+    #: Numbers of pairs and rejections of a search in footprints.
     drawn: Mapping[str, int] = field(default_factory=dict)
+    #: Sentences on rows that are lost.
     losses: Sequence[str] | None = None
+    #: Settings; hash of every input file.
     configuration: Mapping[str, Any] | None = None
     inputs: Mapping[str, str] | None = None
+    #: Hash of every file of the results.
     outputs: Mapping[str, str] = field(default_factory=dict)
+    #: Further plain values, which change no result.
     facts: Mapping[str, object] = field(default_factory=dict)
 
     def write(self, folder: Path, key: str = "") -> Result:
@@ -133,21 +105,13 @@ class RunRecord:
 
 
 class KnownStations(NamedTuple):
-    """
-    Names of the expected stations, and of those with received records.
+    """Names of the expected stations, and of those with received records."""
 
-    Attributes
-    ----------
-    expected : tuple of str
-        Names of all stations of metadata, lists of services and records, sorted.
-    received : tuple of str
-        Those that have records, usable or not, sorted.
-    waiting : tuple of str
-        Names of files that are still being written.
-    """
-
+    #: Names of all stations of metadata, lists of services and records, sorted.
     expected: tuple[str, ...] = ()
+    #: Those that have records, usable or not, sorted.
     received: tuple[str, ...] = ()
+    #: Names of files that are still being written.
     waiting: tuple[str, ...] = ()
 
     @classmethod
@@ -161,15 +125,9 @@ class KnownStations(NamedTuple):
 
 
 class Served(NamedTuple):
-    """
-    Numbers of pairs and buildings for which the record of each station is used.
+    """Numbers of pairs and buildings for which the record of each station is used."""
 
-    Attributes
-    ----------
-    pairs, buildings : mapping of str to int
-        By station; buildings are known where pairs name them.
-    """
-
+    #: By station; buildings are known where pairs name them.
     pairs: Mapping[str, int]
     buildings: Mapping[str, int]
 

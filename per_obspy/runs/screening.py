@@ -40,18 +40,11 @@ KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
 
 class PairNotes(NamedTuple):
-    """
-    Sentences about the pair tables of a run.
+    """Sentences about the pair tables of a run."""
 
-    Attributes
-    ----------
-    recognised : tuple of str
-        How each table that is not plain is read.
-    suspicions : tuple of str
-        Sentences on what is possible but odd: rows, columns, pairs and buildings given twice.
-    """
-
+    #: How each table that is not plain is read.
     recognised: tuple[str, ...] = ()
+    #: Sentences on what is possible but odd: rows, columns, pairs and buildings given twice.
     suspicions: tuple[str, ...] = ()
 
     def as_record(self) -> dict[str, list[str]]:
@@ -60,33 +53,21 @@ class PairNotes(NamedTuple):
 
 
 class Screened(NamedTuple):
-    """
-    Result of the screening.
+    """Result of the screening."""
 
-    Attributes
-    ----------
-    outputs : list of Path
-        The files.
-    counts : dict
-        Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
-    served : Served
-        Numbers of pairs and buildings for which the record of each station is used.
-    unplaced : tuple of Rejection
-        Stations that serve no pair because their place is unknown.
-    failed : bool
-        Whether the work of a chunk failed unexpectedly.
-    pair_tables : PairNotes
-        Sentences on the recognised form of the pair tables, and on what is odd in them.
-    coverage : Coverage
-        Rows of the pair tables, and those that are left out.
-    """
-
+    #: The files.
     outputs: list[Path]
+    #: Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
     counts: dict[str, int]
+    #: Numbers of pairs and buildings for which the record of each station is used.
     served: Served
+    #: Stations that serve no pair because their place is unknown.
     unplaced: tuple[Rejection, ...]
+    #: Whether the work of a chunk failed unexpectedly.
     failed: bool
+    #: Sentences on the recognised form of the pair tables, and on what is odd in them.
     pair_tables: PairNotes
+    #: Rows of the pair tables, and those that are left out.
     coverage: Coverage
 
 

@@ -35,40 +35,23 @@ NAMED = 10
 
 
 class FoundStations(NamedTuple):
-    """
-    Stations of the configured sources, not done yet.
+    """Stations of the configured sources, not done yet."""
 
-    Attributes
-    ----------
-    tasks : list of StationTask
-        One per station.
-    rejected : list of Rejection
-        Files and records of the sources that cannot be used.
-    hashes : dict
-        Hash of every file that was read on the way.
-    earthquakes : list of dict
-        Facts of every earthquake in the folder of records.
-    known : KnownStations
-        Stations that are expected, and those of which records came.
-    """
-
+    #: One per station.
     tasks: list[StationTask]
+    #: Files and records of the sources that cannot be used.
     rejected: list[Rejection]
+    #: Hash of every file that was read on the way.
     hashes: dict[Path, str]
+    #: Facts of every earthquake in the folder of records.
     earthquakes: list[dict[str, object]]
+    #: Stations that are expected, and those of which records came.
     known: KnownStations = KnownStations()
 
 
 def find_station_tasks(context: RunContext, fetched: Fetched | None) -> FoundStations:
     """
     Find the stations of a run; simulated records are written into the output folder first.
-
-    Parameters
-    ----------
-    context : RunContext
-        The run.
-    fetched : Fetched or None
-        Records of FDSN services in their cache.
 
     Raises
     ------
@@ -182,19 +165,12 @@ def finished_stations(tasks: Sequence[StationTask], workers: Workers) -> list[Fi
 
 
 class ComparedStations(NamedTuple):
-    """
-    Stations after the comparison with each other.
+    """Stations after the comparison with each other."""
 
-    Attributes
-    ----------
-    stations : list of FinishedStation
-        All of them: with the flags and warnings of the comparison, or rejected by it.
-    trusted : dict
-        ``kept``: trusted stations that a check would have rejected; ``plausible``: those
-        that it would not; ``unknown``: trusted names of which there is no record.
-    """
-
+    #: All of them: with the flags and warnings of the comparison, or rejected by it.
     stations: list[FinishedStation]
+    #: ``kept``: trusted stations that a check would have rejected; ``plausible``: those that it
+    #: would not; ``unknown``: trusted names of which there is no record.
     trusted: dict[str, list[str]]
 
 

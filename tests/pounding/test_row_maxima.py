@@ -117,7 +117,7 @@ class TestSingleHistories:
         monkeypatch.setattr(rows_page, "FIRST_ROOM", 4)
         monkeypatch.setattr(rows_page, "MOST_IMPACTS", 8)
         rows = plain(random_rows([5], gap=(0.0, 0.0), seed=3))
-        with pytest.raises(RuntimeError, match="impacts that may count, most 8"):
+        with pytest.raises(RuntimeError, match="more than 8 impacts that may count"):
             row_maxima(NORTH, EAST, DT, rows)
 
     @pytest.mark.parametrize("gap", [0.0, 0.02])

@@ -93,6 +93,15 @@ def log_impact(log, row, j, time, impulse, before_1, before_2):
 
 
 @lean
+def has_room(row, log):
+    """Return whether the log holds every impact of a row so far."""
+    count = 0.0
+    for k in range(row.shape[0] - 1):
+        count += row[k, IMPACTS]
+    return count <= log.shape[0]
+
+
+@lean
 def apply_impact(row, log, j, time):
     """Apply one impact to the two structures of an interface: equations (7) to (10)."""
     before_1 = row[j, V]

@@ -146,7 +146,6 @@ def _treat(kind, lanes, flags, together, memory, firsts, number, record, grounds
 @lean
 def _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
-    is_through = True
     while step < last:
         # all lanes side by side through one tile
         fill_ground(record, step, grounds[0])
@@ -155,22 +154,22 @@ def _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last):
             # flagged rows one by one
             for number in range(firsts.size - 1):
                 together = _flags_of(kind, flags, firsts, number)
-                if together:
-                    is_through &= _treat(
-                        kind,
-                        lanes,
-                        flags,
-                        together,
-                        memory,
-                        firsts,
-                        number,
-                        record,
-                        grounds,
-                        step,
-                        count,
-                    )
+                if together and not _treat(
+                    kind,
+                    lanes,
+                    flags,
+                    together,
+                    memory,
+                    firsts,
+                    number,
+                    record,
+                    grounds,
+                    step,
+                    count,
+                ):
+                    return False
         step += count
-    return is_through
+    return True
 
 
 @lean
@@ -234,10 +233,9 @@ def run_lanes(kind, record, lanes, flags, grounds, memory, firsts, cosine, sine,
     memory : tuple of ndarray
         Room for lines of lanes (n_buildings * STRUCTURE_ROWS,); lines of all buildings
         (n_buildings, ROW_COLUMNS) at rest, then at the end, see `motion` for the columns; logs
-        (n_rows, n_lines, LOG_COLUMNS), which receive one line per impact that may count as long as
-        there is room; deferred tiles (n_buildings, DEFERRED_COLUMNS), zero at the start; room for
-        the states of a row (n_buildings, STATE_COLUMNS) and a window (WINDOW_SIZE,), zero at the
-        start, for ROWS only.
+        (n_rows, n_lines, LOG_COLUMNS), which receive one line per impact that may count; deferred
+        tiles (n_buildings, DEFERRED_COLUMNS), zero at the start; room for the states of a row
+        (n_buildings, STATE_COLUMNS) and a window (WINDOW_SIZE,), zero at the start, for ROWS only.
     firsts : (n_rows + 1,) ndarray of int
         First building of each row, then the number of buildings.
     cosine, sine : (n_rows,) ndarray
@@ -249,20 +247,21 @@ def run_lanes(kind, record, lanes, flags, grounds, memory, firsts, cosine, sine,
     Returns
     -------
     bool
-        Whether all rows got through: no step had too many events.
+        Whether all rows got through: no step had too many events, and each log had room. The run
+        ends with the first that did not.
     """
     _prepare(kind, lanes, memory, firsts, cosine, sine, free_steps, record.duration)
     # the record, as far as any row needs it
     last = (record.components.shape[1] - 1) * record.refinement
     groups = record.sizes.shape[1]
     group = 0
-    is_through = True
     active = firsts.size - 1
     while active and group < groups:
         step = group * GROUP_SAMPLES * record.refinement
         group = min(group + GROUPS_BETWEEN_CHECKS, groups)
         end = min(group * GROUP_SAMPLES * record.refinement, last)
-        is_through &= _advance(kind, lanes, flags, memory, firsts, record, grounds, step, end)
+        if not _advance(kind, lanes, flags, memory, firsts, record, grounds, step, end):
+            return False
         if group < groups:
             active = _retire(
                 kind, lanes, memory, firsts, cosine, sine, record, grounds, free_steps, group, -1
@@ -274,9 +273,10 @@ def run_lanes(kind, record, lanes, flags, grounds, memory, firsts, cosine, sine,
     ):
         step = last
         last += SETTLING_STEPS * record.refinement
-        is_through &= _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last)
+        if not _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last):
+            return False
         elapsed += SETTLING_STEPS
-    return is_through
+    return True
 
 
 Floats = NDArray[np.float64]

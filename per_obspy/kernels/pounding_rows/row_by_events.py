@@ -11,6 +11,7 @@ from per_obspy.kernels.pounding_events.contact import (
     LOG_BEFORE_2,
     LOG_LEFT,
     SLOWEST_COUNTED,
+    has_room,
 )
 from per_obspy.kernels.pounding_events.motion import (
     APPROACH,
@@ -28,13 +29,13 @@ from per_obspy.kernels.pounding_lanes.step_by_step import run_events
 @lean
 def _advance_interval(row, log, time, start, slope, refinement, duration, terms):
     """Carry a row through one sampling interval; return whether it got through."""
-    is_through = True
     for part in range(refinement):
         shift = part * duration
         row[0, BOUNCES] = 0.0
         segment = Segment(time + shift, duration, start + slope * shift, slope, terms)
-        is_through &= run_events(row, log, segment, 0.0, False)
-    return is_through
+        if not run_events(row, log, segment, 0.0, False) or not has_room(row, log):
+            return False
+    return True
 
 
 @kernel
@@ -56,35 +57,36 @@ def run_row_by_events(north, east, cosine, sine, dt, refinement, row, log, free_
         Row at rest, then at the end; see `motion` for its columns. It holds the results:
         LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and APPROACH (m/s).
     log : (n_lines, LOG_COLUMNS) ndarray
-        Receives one line per impact as long as there is room; see `contact` for its columns.
+        Receives one line per impact; the run ends where there is no room. See `contact` for its
+        columns.
     free_steps : int
         Sampling intervals of free vibration at most.
 
     Returns
     -------
     bool
-        Whether every segment ended: no segment had too many events.
+        Whether it got through: no segment had too many events, and the log had room.
     """
     duration = dt / refinement
     terms = taylor_terms(row, duration)
     # the energy radius is not computed
     row[:, LARGEST_ENERGY_RADIUS_SQUARED] = math.inf
-    is_through = True
     # the record
     before = cosine * north[0] + sine * east[0]
     for k in range(1, north.size):
         after = cosine * north[k] + sine * east[k]
-        is_through &= _advance_interval(
-            row, log, (k - 1) * dt, before, (after - before) / dt, refinement, duration, terms
-        )
+        time, slope = (k - 1) * dt, (after - before) / dt
+        if not _advance_interval(row, log, time, before, slope, refinement, duration, terms):
+            return False
         before = after
     # free vibration, until the row is settled
     for k in range(free_steps):
         if k % SETTLING_STEPS == 0 and is_settled(row):
             break
         time = (north.size - 1 + k) * dt
-        is_through &= _advance_interval(row, log, time, 0.0, 0.0, refinement, duration, terms)
-    return is_through
+        if not _advance_interval(row, log, time, 0.0, 0.0, refinement, duration, terms):
+            return False
+    return True
 
 
 @kernel

@@ -8,6 +8,7 @@ event to event, by the code of single histories (``next_event``).
 import math
 
 from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels.pounding_events.contact import has_room
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCES,
     IN_CONTACT,
@@ -145,9 +146,8 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
     Returns
     -------
     bool
-        Whether it got through: no step had too many events.
+        Whether it got through: no step had too many events, and the log had room.
     """
-    is_through = True
     # states at the start of the tile
     before = ground_along(members, ground, 0)
     for i in range(row.shape[0]):
@@ -168,7 +168,9 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
             load_row(members, row)
             row[0, BOUNCES] = 0.0
             segment = segment_of_step(row, before, after, duration)
-            is_through &= run_row_impacts(members, row, log, states, window, segment)
+            is_through = run_row_impacts(members, row, log, states, window, segment)
+            if not is_through or not has_room(row, log):
+                return False
         else:
             for i in range(row.shape[0]):
                 start, end = state(states, i, START), state(states, i, END)
@@ -178,4 +180,4 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
             set_state(states, i, START, state(states, i, END))
         before = after
     set_members(members, row, states, START)
-    return is_through
+    return True

@@ -22,18 +22,11 @@ RESULTS = Path("results")
 
 
 class Request(NamedTuple):
-    """
-    Settings of a run, from the arguments of its command.
+    """Settings of a run, from the arguments of its command."""
 
-    Attributes
-    ----------
-    configuration : Path or Run
-        TOML file of the run, or settings that no file holds yet.
-    line : str
-        How the arguments were understood; empty for the configuration of a file alone.
-    """
-
+    #: TOML file of the run, or settings that no file holds yet.
     configuration: Path | Run
+    #: How the arguments were understood; empty for the configuration of a file alone.
     line: str
 
 

@@ -32,41 +32,24 @@ _RISK_COLUMNS = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2",
 
 
 class Description(NamedTuple):
-    """
-    Description of an input or result.
+    """Description of an input or result."""
 
-    Attributes
-    ----------
-    kind, title : str
-        Kind in words, and size in a few words.
-    lines : list of tuple of str
-        Label and text of every fact.
-    places : dict
-        Sign on the map -> longitudes and latitudes, degrees; the empty sign is drawn by numbers.
-    values : dict
-        Plain values, for machines.
-    usable : bool
-        Whether anything in it can be used.
-    """
-
+    #: Kind in words, and size in a few words.
     kind: Kind
     title: str
+    #: Label and text of every fact.
     lines: Lines
+    #: Sign on the map -> longitudes and latitudes, degrees; the empty sign is drawn by numbers.
     places: Mapping[str, Places] = {}
+    #: Plain values, for machines.
     values: Mapping[str, Any] = {}
+    #: Whether anything in it can be used.
     usable: bool = True
 
 
 def describe(argument: str, stationxml: Path | None = None) -> Description:
     """
     Return the description of an input or result.
-
-    Parameters
-    ----------
-    argument : str
-        Path, or identifier of an earthquake.
-    stationxml : Path, optional
-        Metadata of records, if not in their folder.
 
     Raises
     ------

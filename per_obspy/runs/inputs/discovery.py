@@ -26,15 +26,9 @@ TRIED = 20
 
 
 class Found(NamedTuple):
-    """
-    Inputs for a configuration.
+    """Inputs for a configuration."""
 
-    Attributes
-    ----------
-    records, pairs : list of Path
-        Candidates; a configuration needs one of each.
-    """
-
+    #: Candidates; a configuration needs one of each.
     records: list[Path]
     pairs: list[Path]
 
@@ -88,11 +82,6 @@ def write_first_configuration(
         As in ``per-obspy run``; a missing one is looked for in the folder of the file.
     force : bool
         Whether an existing file may be replaced.
-
-    Returns
-    -------
-    lines : list of str
-        Sentences on found and missing inputs.
 
     Raises
     ------

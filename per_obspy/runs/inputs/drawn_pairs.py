@@ -85,13 +85,6 @@ def write_search(found: "FootprintPairs", path: Path) -> "Search":
     """
     Write found pairs, and their buildings and rejections next to them.
 
-    Parameters
-    ----------
-    found : FootprintPairs
-        From a search in footprints.
-    path : Path
-        Pair table, ``.parquet`` or ``.csv``.
-
     Returns
     -------
     Search

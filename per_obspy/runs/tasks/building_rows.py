@@ -19,19 +19,12 @@ from per_obspy.spectra.station import lacks_azimuths
 
 @dataclass(frozen=True, kw_only=True)
 class RowsTask(PartTask):
-    """
-    One chunk of rows of buildings.
+    """One chunk of rows of buildings."""
 
-    Attributes
-    ----------
-    contacts : Table
-        Contacts of whole rows, one after the other, with the columns of their interfaces that are
-        known, and those of ``histories.NEEDED``.
-    station : StationFile or None
-        Whose record they are followed under; None: no history is computed.
-    """
-
+    #: Contacts of whole rows, one after the other, with the columns of their interfaces that are
+    #: known, and those of ``histories.NEEDED``.
     contacts: pa.Table
+    #: Whose record they are followed under; None: no history is computed.
     station: StationFile | None
 
     @property

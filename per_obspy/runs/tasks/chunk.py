@@ -23,21 +23,13 @@ CHUNK = 100_000
 
 @dataclass(frozen=True, kw_only=True)
 class ChunkTask(PartTask):
-    """
-    One chunk of the inventory.
+    """One chunk of the inventory."""
 
-    Attributes
-    ----------
-    chunk : PairChunk
-        Raw rows.
-    ground : GroundFiles
-        The ground motion.
-    building, screening : Building, Screening
-        Settings.
-    """
-
+    #: Raw rows.
     chunk: PairChunk
+    #: The ground motion.
     ground: GroundFiles
+    #: Settings.
     building: Building
     screening: Screening
 

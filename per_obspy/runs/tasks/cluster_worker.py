@@ -33,22 +33,15 @@ _SOURCES = {".py", ".csv"}
 
 
 class Versions(NamedTuple):
-    """
-    Versions on which results depend.
+    """Versions on which results depend."""
 
-    Attributes
-    ----------
-    per_obspy, python, numpy, numba : str
-        Version of each.
-    source : str
-        Beginning of the hash of the program's files, which differ between two checkouts of the
-        same version.
-    """
-
+    #: Version of each.
     per_obspy: str
     python: str
     numpy: str
     numba: str
+    #: Beginning of the hash of the program's files, which differ between two checkouts of the same
+    #: version.
     source: str
 
     def difference(self, expected: "Versions") -> str:
@@ -58,69 +51,42 @@ class Versions(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """
-    Folder that client and workers share while a run is under way.
+    """Folder that client and workers share while a run is under way."""
 
-    Attributes
-    ----------
-    folder : Path
-        Of the run; it also holds the tasks that are too large for a message.
-    token : str
-        Content of a file in it, which no other folder of that name has.
-    """
-
+    #: Of the run; it also holds the tasks that are too large for a message.
     folder: Path
+    #: Content of a file in it, which no other folder of that name has.
     token: str
 
 
 class SentTask(NamedTuple):
-    """
-    A task on its way to a worker.
+    """A task on its way to a worker."""
 
-    Attributes
-    ----------
-    content : bytes
-        The pickled task; empty if it is in a file.
-    file : Path or None
-        In the shared folder.
-    hash : str
-        SHA-256 of the file's content.
-    shared : Shared
-        The shared folder.
-    versions : Versions
-        Those of the client.
-    """
-
+    #: The pickled task; empty if it is in a file.
     content: bytes
+    #: In the shared folder.
     file: Path | None
+    #: SHA-256 of the file's content.
     hash: str
+    #: The shared folder.
     shared: Shared
+    #: Those of the client.
     versions: Versions
 
 
 class Outcome(NamedTuple):
-    """
-    Outcome of a task on a worker.
+    """Outcome of a task on a worker."""
 
-    Attributes
-    ----------
-    value : object
-        Its result.
-    error : Exception or None
-        Error of the task.
-    refusal : str
-        Why the worker is unfit for any task of this run; empty if it is fit.
-    worker, host : str
-        Address of the worker, name of its machine.
-    seconds : float
-        Processor time.
-    """
-
+    #: Its result.
     value: Any
+    #: Error of the task.
     error: Exception | None
+    #: Why the worker is unfit for any task of this run; empty if it is fit.
     refusal: str
+    #: Address of the worker, name of its machine.
     worker: str
     host: str
+    #: Processor time.
     seconds: float
 
 

@@ -147,16 +147,7 @@ def present_workers(client: Any) -> Mapping[str, tuple[str, int]]:
 
 
 def unfit_workers(client: Any, new: Collection[str]) -> Iterator[tuple[str, str, str]]:
-    """
-    Yield address, machine and fault of new workers; the fault is empty if a worker is fit.
-
-    Parameters
-    ----------
-    client : distributed.Client
-        Of the cluster.
-    new : collection of str
-        Addresses.
-    """
+    """Yield address, machine and fault of new workers; the fault is empty if a worker is fit."""
     if not new:
         return
     # Without the package a worker cannot even be asked by it
@@ -176,24 +167,15 @@ def unfit_workers(client: Any, new: Collection[str]) -> Iterator[tuple[str, str,
 
 @dataclass
 class ClusterWorker:
-    """
-    What is known of one worker.
+    """What is known of one worker."""
 
-    Attributes
-    ----------
-    host : str
-        Name of its machine.
-    threads : int
-        Number of its threads; 0 if it is not there.
-    fault : str
-        Why it is unfit for this run; empty if it is fit.
-    tasks, seconds : int, float
-        Its finished tasks, and their processor time, s.
-    """
-
+    #: Name of its machine.
     host: str = "unknown"
+    #: Number of its threads; 0 if it is not there.
     threads: int = 0
+    #: Why it is unfit for this run; empty if it is fit.
     fault: str = ""
+    #: Its finished tasks, and their processor time, s.
     tasks: int = 0
     seconds: float = 0.0
 
@@ -212,14 +194,7 @@ class ClusterWorkers:
         self._left_out = 0
 
     def update(self, present: Mapping[str, tuple[str, int]]) -> set[str]:
-        """
-        Update the present workers, note those that disappeared, and return new addresses.
-
-        Parameters
-        ----------
-        present : mapping of str to (str, int)
-            Address -> machine, threads.
-        """
+        """Update the present workers, note those that disappeared, and return new addresses."""
         with self._lock:
             before = {address for address, one in self._workers.items() if one.threads}
             for address, (host, threads) in present.items():
@@ -567,13 +542,6 @@ def on_cluster(settings: Run, address: str | None) -> Run:
     Return settings whose every run connects to a Dask cluster by itself; unchanged without one.
 
     A program of many runs outlives a scheduler that is started again.
-
-    Parameters
-    ----------
-    settings : Run
-        Of the runs.
-    address : str or None
-        As :func:`dask_executor` takes it.
 
     Raises
     ------

@@ -27,77 +27,40 @@ STATIONS_KEPT = 200
 
 
 class StationFile(NamedTuple):
-    """
-    A station that can serve pairs.
+    """A station that can serve pairs."""
 
-    Attributes
-    ----------
-    name : str
-        ``NETWORK.STATION``.
-    longitude, latitude : float
-        Degrees east and north.
-    site_class : str
-        Of the ground, empty if unknown.
-    shard : Path
-        Its Dataset.
-    hash : str
-        Of the station file.
-    flags : str
-        Of its record, those of the comparison with other stations included.
-    """
-
+    #: ``NETWORK.STATION``.
     name: str
+    #: Degrees east and north.
     longitude: float
     latitude: float
+    #: Of the ground, empty if unknown.
     site_class: str
+    #: Its Dataset.
     shard: Path
+    #: Of the station file.
     hash: str
+    #: Of its record, those of the comparison with other stations included.
     flags: str = ""
 
 
 class GroundFiles(NamedTuple):
-    """
-    Ground motion of a region, for other processes to read.
+    """Ground motion of a region, for other processes to read."""
 
-    Attributes
-    ----------
-    stations : tuple of StationFile
-        Stations that can serve pairs.
-    field : StationField or None
-        The motion between them; None if there are none.
-    shakemap : tuple of Path
-        ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
-    key : str
-        Hash of all their contents.
-    """
-
+    #: Stations that can serve pairs.
     stations: tuple[StationFile, ...]
+    #: The motion between them; None if there are none.
     field: StationField | None
+    #: ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
     shakemap: tuple[Path, ...]
+    #: Hash of all their contents.
     key: str
 
 
 def ground_files(
     stations: Iterable[FinishedStation], shakemap: tuple[Path, ...], settings: Interpolation
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
-    """
-    Describe the ground motion by finished stations and a ShakeMap; no station file is opened.
-
-    Parameters
-    ----------
-    stations : iterable of FinishedStation
-        With station files.
-    shakemap : tuple of Path
-        Files of the ShakeMap, empty if there is none.
-    settings : Interpolation
-        For the motion between the stations.
-
-    Returns
-    -------
-    ground : GroundFiles
-    rejected : tuple of Rejection
-        Stations without coordinates.
-    """
+    """Describe the ground motion by finished stations and a ShakeMap; no station file is opened."""
     files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
     # Pairs are given stations by distance
     for station in stations:

@@ -17,11 +17,6 @@ def compile_kernels(progress: Progress) -> None:
     """
     Compile all kernels that a command may need; compiled ones are only loaded.
 
-    Parameters
-    ----------
-    progress : callable
-        Called for every part.
-
     Raises
     ------
     WriteError

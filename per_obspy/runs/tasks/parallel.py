@@ -54,21 +54,13 @@ Failed = Callable[[Task, str], Result]
 
 
 class Work(NamedTuple, Generic[Task, Result]):
-    """
-    Function of every task, with its substitute for failures and the name of a task.
+    """Function of every task, with its substitute for failures and the name of a task."""
 
-    Attributes
-    ----------
-    do : callable
-        The work itself.
-    failed : callable
-        Substitute for the result of a task whose data are at fault.
-    name : callable
-        Name of a task in messages.
-    """
-
+    #: The work itself.
     do: Do[Task, Result]
+    #: Substitute for the result of a task whose data are at fault.
     failed: Failed[Task, Result]
+    #: Name of a task in messages.
     name: Callable[[Task], str] = str
 
 
@@ -99,21 +91,13 @@ class Resumable(ABC, Generic[Result]):
 
 @dataclass(frozen=True)
 class Workers:
-    """
-    Processes in which tasks are done, and who is told of finished ones.
+    """Processes in which tasks are done, and who is told of finished ones."""
 
-    Attributes
-    ----------
-    processes : int
-        Number of processes; one, or a single task, needs none but this. 0: one per processor.
-    executor : Executor or None
-        Where to work instead.
-    progress : callable
-        Called with the name of a stage, and the numbers of finished and of all its tasks.
-    """
-
+    #: Number of processes; one, or a single task, needs none but this. 0: one per processor.
     processes: int = 0
+    #: Where to work instead.
     executor: Executor | None = None
+    #: Called with the name of a stage, and the numbers of finished and of all its tasks.
     progress: Progress = silent
 
     @property
@@ -154,15 +138,6 @@ class ElasticExecutor(Executor):
 def results(tasks: Iterable[Task], work: Work[Task, Result], workers: Workers) -> Iterator[Result]:
     """
     Yield the result of every task as it is finished.
-
-    Parameters
-    ----------
-    tasks : iterable
-        Tasks, which are taken while the work goes on.
-    work : Work
-        Function of every task.
-    workers : Workers
-        Where to work.
 
     Raises
     ------
@@ -215,13 +190,6 @@ def prepare_workers(workers: int) -> None:
 def finish(tasks: Iterable[Resumable[Result]], workers: Workers) -> Iterator[Result]:
     """
     Yield the result of every resumable task; results of an earlier run are reused.
-
-    Parameters
-    ----------
-    tasks : iterable of Resumable
-        Tasks, which are taken while the work goes on.
-    workers : Workers
-        Where to work.
 
     Raises
     ------

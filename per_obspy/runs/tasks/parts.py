@@ -21,50 +21,31 @@ from per_obspy.runs.tasks.parallel import Resumable
 
 
 class Part(NamedTuple):
-    """
-    Result of a task.
+    """Result of a task."""
 
-    Attributes
-    ----------
-    number : int
-        Its place.
-    rows : int
-        Number of rows that it took.
-    path : Path or None
-        Its rows; None if none was left.
-    status : Path
-        Status file with the rejections, see :func:`rejections`.
-    resumed : bool
-        Whether an earlier run had done it.
-    failed : bool
-        Whether its work failed unexpectedly, so that the next run does it again.
-    """
-
+    #: Its place.
     number: int
+    #: Number of rows that it took.
     rows: int
+    #: Its rows; None if none was left.
     path: Path | None
+    #: Status file with the rejections, see :func:`rejections`.
     status: Path
+    #: Whether an earlier run had done it.
     resumed: bool = False
+    #: Whether its work failed unexpectedly, so that the next run does it again.
     failed: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartTask(Resumable[Part]):
-    """
-    Task that makes one part.
+    """Task that makes one part."""
 
-    Attributes
-    ----------
-    number : int
-        Place of the part among all of them.
-    part : Path
-        Parquet file that it makes.
-    key : str
-        Hash of everything on which the part depends; empty until it is computed.
-    """
-
+    #: Place of the part among all of them.
     number: int
+    #: Parquet file that it makes.
     part: Path
+    #: Hash of everything on which the part depends; empty until it is computed.
     key: str = ""
 
     @property

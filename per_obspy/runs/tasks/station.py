@@ -70,18 +70,7 @@ def source_facts(event: EventFile | None) -> dict[str, object] | None:
 
 
 def is_of_event(status: Mapping[str, Any], event: EventFile, processing: Processing) -> bool:
-    """
-    Return whether the motion of a station is that which an earthquake gives.
-
-    Parameters
-    ----------
-    status : mapping
-        Content of the station's status file.
-    event : EventFile
-        The earthquake now.
-    processing : Processing
-        Settings of the station.
-    """
+    """Return whether the motion of a station is that which an earthquake gives."""
     decisions = status.get("decisions")
     if not isinstance(decisions, list) or not isinstance(status.get("source"), dict):
         return False
@@ -122,21 +111,13 @@ SPECTRA = ".nc"
 
 
 class Products(NamedTuple):
-    """
-    Files made of the records of a station.
+    """Files made of the records of a station."""
 
-    Attributes
-    ----------
-    rejected : tuple of Rejection
-        Rejected inputs, each with its reasons.
-    files : tuple of Path
-        The station file and all files written with it; empty without a usable record.
-    facts : mapping
-        Plain values that the status file holds besides.
-    """
-
+    #: Rejected inputs, each with its reasons.
     rejected: tuple[Rejection, ...]
+    #: The station file and all files written with it; empty without a usable record.
     files: tuple[Path, ...] = ()
+    #: Plain values that the status file holds besides.
     facts: Mapping[str, object] = MappingProxyType({})
 
 
@@ -155,33 +136,21 @@ def spectra_shard(task: "StationTask", stream: "Stream", source: "Source | None"
 
 
 class FinishedStation(NamedTuple):
-    """
-    Result of a station.
+    """Result of a station."""
 
-    Attributes
-    ----------
-    station : str
-        ``NETWORK.STATION``.
-    shard : Path or None
-        Its Dataset; None if no usable record was left.
-    rejected : tuple of Rejection
-        Rejected inputs, each with its reasons.
-    resumed : bool
-        Whether an earlier run had processed it.
-    hash : str
-        Of the station file; empty if there is none.
-    spectra : Dataset or None
-        Content of a station file without the motion, so that no later stage reads it again.
-    failed : bool
-        Whether its work failed unexpectedly, so that the next run does it again.
-    """
-
+    #: ``NETWORK.STATION``.
     station: str
+    #: Its Dataset; None if no usable record was left.
     shard: Path | None
+    #: Rejected inputs, each with its reasons.
     rejected: tuple[Rejection, ...]
+    #: Whether an earlier run had processed it.
     resumed: bool
+    #: Of the station file; empty if there is none.
     hash: str = ""
+    #: Content of a station file without the motion, so that no later stage reads it again.
     spectra: xr.Dataset | None = None
+    #: Whether its work failed unexpectedly, so that the next run does it again.
     failed: bool = False
 
 
@@ -191,43 +160,28 @@ READ = partial(read_station)
 
 @dataclass(frozen=True, kw_only=True)
 class StationTask(Resumable[FinishedStation]):
-    """
-    One station, from its records to its station file.
+    """One station, from its records to its station file."""
 
-    Attributes
-    ----------
-    station : str
-        ``NETWORK.STATION``.
-    source : tuple of Path
-        Its waveform files.
-    inventory : Inventory or None
-        Its metadata.
-    event : EventFile or None
-        The earthquake.
-    processing, spectra : Processing, Spectra
-        Settings.
-    shard : Path
-        Where its Dataset goes.
-    hashes : tuple of str
-        Of the waveform files.
-    reader : partial
-        How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
-    product : callable
-        Function that makes the files from the records: see :func:`spectra_shard`.
-    key : str
-        Hash of all inputs of the station file but the earthquake; empty until it is computed.
-    """
-
+    #: ``NETWORK.STATION``.
     station: str
+    #: Its waveform files.
     source: tuple[Path, ...]
+    #: Its metadata.
     inventory: "Inventory | None"
+    #: The earthquake.
     event: EventFile | None
+    #: Settings.
     processing: Processing
     spectra: Spectra
+    #: Where its Dataset goes.
     shard: Path
+    #: Of the waveform files.
     hashes: tuple[str, ...] = ()
+    #: How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
     reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = READ
+    #: Function that makes the files from the records: see :func:`spectra_shard`.
     product: "Callable[[StationTask, Stream, Source | None], Products]" = spectra_shard
+    #: Hash of all inputs of the station file but the earthquake; empty until it is computed.
     key: str = ""
 
     @property
@@ -393,11 +347,6 @@ def _stored_rejections(status: Status) -> tuple[Rejection, ...]:
 def earlier_station(status_file: Path) -> FinishedStation:
     """
     Return the station of an earlier run, even if its source has changed since.
-
-    Parameters
-    ----------
-    status_file : Path
-        Next to the station file.
 
     Raises
     ------
