@@ -57,7 +57,7 @@ def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Repor
     if files := table_files(folder):
         with report.tried(folder / WORST_PAIRS):
             with ranked_table(files) as table:
-                worst = worst_pairs(table, settings.totals)
+                worst = table.first(PAGE_PAIRS, table.schema.names[: 2 * MOST_COLUMNS])
             write_drawings(page_drawings(settings, worst, stations), folder / WORST_PAIRS)
     return report
 
