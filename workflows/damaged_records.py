@@ -26,8 +26,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.config import Run
 from per_obspy.records.folder import find_stations
+from per_obspy.report.files import Report
 from per_obspy.runs import stages
-from per_obspy.runs.results.report_files import Report
 from per_obspy.runs.run import run
 
 Samples = NDArray[np.float64]

@@ -185,7 +185,7 @@ def _write_design(
 ) -> tuple[list[Path], str]:
     """Write the files of a screening by a design spectrum, ``rejected.csv`` last, and its alert."""
     from per_obspy.results.risk import write_design
-    from per_obspy.runs.results.table_report import report_design
+    from per_obspy.runs.report import report_design
 
     *files, rejected = write_design(table, folder)
     made = report_design(settings, table, coverage, folder)

@@ -22,7 +22,7 @@ def show(
     Example: per-obspy show P0000019 output/demo -o pair.png
     """
     from per_obspy.report.words import pair_lines
-    from per_obspy.runs.results.shown_pair import draw_pair, find_pair
+    from per_obspy.runs.shown_pair import draw_pair, find_pair
 
     if output is not None and output.suffix.lower() != ".png":
         raise CatalogError(str(output), f"unknown suffix {output.suffix!r}, expected .png")

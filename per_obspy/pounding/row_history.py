@@ -303,19 +303,29 @@ def _run(
 
 def impact_table(log: FloatArray) -> pd.DataFrame:
     """Return the table of impacts, as in `PoundingHistory`, from the columns of ``LOGGED``."""
-    table = pd.DataFrame(log, columns=LOGGED).astype({"left": np.int64})
+    columns = dict(zip(LOGGED, log.T, strict=True))
+    left = columns["left"] = columns["left"].astype(np.int64)
 
     # Transfer energies (9), (10) in their short form: impulse times mean velocity
+    energies = []
     for i, sign in ((1, 1.0), (2, -1.0)):
-        mean = 0.5 * (table[f"velocity_before_{i}"] + table[f"velocity_after_{i}"])
-        table[f"transfer_energy_{i}"] = sign * table["impulse"] * mean
-    loss = table["transfer_energy_1"] + table["transfer_energy_2"]
+        mean = 0.5 * (columns[f"velocity_before_{i}"] + columns[f"velocity_after_{i}"])
+        energies.append(sign * columns["impulse"] * mean)
 
     # Chatter of structures that are pressed together does not count
-    approach = table["velocity_before_1"] - table["velocity_before_2"]
-    fastest = approach.groupby(table["left"]).transform("max")
-    counted = approach > np.maximum(SLOWEST_COUNTED, COUNTED_SHARE * fastest)
-    return table.assign(energy_loss=loss, counted=counted)
+    approach = columns["velocity_before_1"] - columns["velocity_before_2"]
+    fastest = np.full(left.max(initial=-1) + 1, -np.inf)
+    np.maximum.at(fastest, left, approach)
+    counted = approach > np.maximum(SLOWEST_COUNTED, COUNTED_SHARE * fastest[left])
+    return pd.DataFrame(
+        {
+            **columns,
+            "transfer_energy_1": energies[0],
+            "transfer_energy_2": energies[1],
+            "energy_loss": energies[0] + energies[1],
+            "counted": counted,
+        }
+    )
 
 
 def _checked_gaps(

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from obspy import Trace
 from obspy.core.inventory import Response
 from obspy.core.inventory.response import InstrumentSensitivity, ResponseStage
-from obspy.signal.invsim import cosine_sac_taper
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 
@@ -317,6 +316,10 @@ def _require_flat(trace: Trace, response: Response) -> None:
 
 def _deconvolve(trace: Trace, response: Response, low: tuple[float, float]) -> Trace:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
+    # ObsPy's signal processing loads SciPy's and pyplot: a fifth of what a run loads at its start,
+    # of which only its workers have need
+    from obspy.signal.invsim import cosine_sac_taper
+
     band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up samples that the filter moves around
     count, dt = trace.stats.npts, trace.stats.delta

@@ -5,8 +5,6 @@ from statistics import median
 
 import numpy as np
 from obspy import Stream, Trace, UTCDateTime
-from obspy.signal.trigger import pk_baer
-from scipy.signal import butter, sosfilt
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
@@ -149,6 +147,8 @@ def _root_mean_square(samples: FloatArray) -> float:
 
 def _between_1_and_20_hertz(samples: FloatArray, dt: float) -> FloatArray:
     """Return filtered samples: causally, so that no wave arrives early."""
+    from scipy.signal import butter, sosfilt  # in workers only, see instrument_response
+
     corners = [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)]
     sections = butter(2, corners, "bandpass", fs=1 / dt, output="sos")
     return np.asarray(sosfilt(sections, without_line(samples)))
@@ -215,6 +215,8 @@ def baer_onset(samples: FloatArray, dt: float) -> int | None:
     ----------
     Baer & Kradolfer 1987, Bull. Seism. Soc. Am. 77, 1437-1445 (as in ObsPy).
     """
+    from obspy.signal.trigger import pk_baer  # in workers only, see instrument_response
+
     second = round(1.0 / dt)
     if samples.size < 4 * second or not samples.any():
         return None

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 from scipy.ndimage import minimum_filter1d
-from scipy.signal.windows import tukey
 from scipy.sparse import csr_array
 
 from per_obspy.checks import FloatArray
@@ -56,6 +55,8 @@ def noise_spectra(
     the noise is unknown: its lowest resolved amplitude is carried on. The acceleration, m/s2, is
     without its baseline; the bandwidth is that of the Konno-Ohmachi window, dimensionless.
     """
+    from scipy.signal.windows import tukey  # in workers only, see instrument_response
+
     # Noise before the onset, significant shaking after it
     noise, shaking = np.split(acceleration, [round(onset / dt)])
     noise, signal = noise - noise.mean(), shaking[: significant_samples(shaking)]

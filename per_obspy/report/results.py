@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import pandas as pd
+import xarray as xr
 
 from per_obspy.report.tally import PairTally
 from per_obspy.report.texts import counted, texts_of, written
@@ -123,6 +124,8 @@ class Results:
         ``coast`` and ``borders``, lines of longitude and latitude by turns.
     drawings : Drawings
         Histories, stations and sensitivities.
+    record : Dataset or None
+        Station file of the pair that is drawn from its record to pounding; None without a record.
     provenance : sequence of (str, str)
         Titles and texts on where the results come from.
     own : sequence of str
@@ -150,6 +153,7 @@ class Results:
     outlines: Sequence[tuple[str, list[float]]] = ()
     lines: Mapping[str, list[list[float]]] = field(default_factory=dict)
     drawings: Drawings = field(default_factory=Drawings)
+    record: xr.Dataset | None = None
     provenance: Sequence[tuple[str, str]] = ()
     own: Sequence[str] = ()
     class_limits: Mapping[str, float] = field(default_factory=dict)

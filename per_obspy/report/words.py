@@ -244,7 +244,7 @@ def _place_lines(pair: Mapping[str, Any]) -> list[str]:
     if not (math.isfinite(east) and math.isfinite(north)):
         return []
     # The nearest town where the inventory names no place
-    (place,) = with_towns([_text(pair, "place")], [east], [north])
+    place = _text(pair, "place") or with_towns([""], [east], [north])[0]
     at = f"{north:.5f},{east:.5f}"
     osm = f"https://www.openstreetmap.org/?mlat={north:.5f}&mlon={east:.5f}#map=19/{at}"
     return [f"Place: {name_text(place)}.", f"Maps: geo:{at} {osm.replace(',', '/')}"]

@@ -37,9 +37,9 @@ from per_obspy.runs.output_folder import (
     software_versions,
 )
 from per_obspy.runs.pairs import check_inputs
-from per_obspy.runs.results.scenario_runs import ScenarioRun, ScenarioRuns
-from per_obspy.runs.results.table_report import report_ensemble
+from per_obspy.runs.report import report_ensemble
 from per_obspy.runs.run import run
+from per_obspy.runs.scenario_runs import ScenarioRun, ScenarioRuns
 from per_obspy.screening.ensemble import (
     SAME,
     SEVERITY,

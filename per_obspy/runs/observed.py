@@ -19,7 +19,7 @@ from per_obspy.results.table_files import write_rejected
 from per_obspy.runs.inputs.drawn_pairs import pair_table
 from per_obspy.runs.inspections import Answers, Form, agreed, read_forms
 from per_obspy.runs.pairs import named_files
-from per_obspy.runs.results.shown_pair import is_simulated
+from per_obspy.runs.shown_pair import is_simulated
 from per_obspy.screening.evaluation import evaluation
 
 #: Standard deviation of a gap that was measured with a tape, m (reasoned).

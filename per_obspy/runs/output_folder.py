@@ -24,6 +24,9 @@ from per_obspy.resume import write_status
 #: Written first as unfinished, and last as it ends.
 RECORD = "run.json"
 
+#: Histories and sensitivity of the worst pairs of a run.
+WORST_PAIRS = "worst_pairs.json"
+
 #: State of a run that is under way, was killed, or met a fault of the machine; and its stages.
 UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
 

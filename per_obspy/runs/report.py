@@ -1,8 +1,14 @@
-"""Last stage of a run: the risk table and the spectra become totals, figures, layers and a page."""
+"""
+Last stage of every screening: what it found becomes one `Results`, of which the files are written.
+
+A run, a design spectrum and an ensemble differ in where their pairs, stations and sentences come
+from; everything after that is :func:`per_obspy.report.files.write_report`.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -10,38 +16,50 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from per_obspy.config import Run
-from per_obspy.report.evaluation import write_evaluation
-from per_obspy.report.page.document import write_page
+from per_obspy.config import Design, Ensemble, Run, Totals
+from per_obspy.config import Screening as ScreeningSettings
+from per_obspy.errors import CatalogError
+from per_obspy.report.files import (
+    PairTable,
+    Report,
+    needed_columns,
+    outlines_beside,
+    with_areas,
+    write_report,
+)
 from per_obspy.report.page.packing import MOST_COLUMNS
-from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
-from per_obspy.report.results import Region, Results
+from per_obspy.report.pair_figure import differing_pair
+from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.statements import event_sentences
 from per_obspy.report.tally import PAGE_PAIRS
 from per_obspy.report.texts import LANGUAGES
+from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
+from per_obspy.runs.output_folder import WORST_PAIRS
 from per_obspy.runs.provenance import RunContext
-from per_obspy.runs.results.drawings import page_drawings, station_rows
-from per_obspy.runs.results.report_files import (
-    Report,
-    TableReader,
-    content_note,
-    made_with,
-    needed_columns,
-    outlines_beside,
-    read_table,
-    with_areas,
-    with_page_data,
-    write_files,
-    write_overview,
-)
-from per_obspy.runs.results.run_facts import event_of_run, read_stations, revision_of_run
-from per_obspy.runs.stations import simulated_motion
+from per_obspy.runs.run_facts import event_of_run, revision_of_run
+from per_obspy.runs.scenario_runs import ScenarioRuns
+from per_obspy.runs.stations import file_stem, simulated_motion
 from per_obspy.runs.tasks.ground_files import read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
+from per_obspy.runs.worst_pairs import page_drawings, read_drawings, station_rows, write_drawings
+from per_obspy.screening.design import DESIGN
+from per_obspy.screening.ensemble import ensemble_columns
+from per_obspy.screening.ranking import pounding_state, risk_class
 from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
+
+
+def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Report:
+    """Write histories and sensitivity of the worst pairs of a run; none without a risk table."""
+    settings, folder, report = context.settings, context.folder, Report([], [])
+    if files := table_files(folder):
+        with report.tried(folder / WORST_PAIRS):
+            with ranked_table(files) as table:
+                worst = table.first(PAGE_PAIRS, table.schema.names[: 2 * MOST_COLUMNS])
+            write_drawings(page_drawings(settings, worst, stations), folder / WORST_PAIRS)
+    return report
 
 
 def reported(
@@ -72,14 +90,34 @@ def reported(
         report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
     if table_files(folder):
-        shakemap = settings.records.shakemap if settings.records else None
-        region = run_region(settings, simulated_motion(settings, stations), spectra)
-        known = event_of_run(folder / "run.json", region, shakemap)
-        if region.epicentre is None:
-            region = region._replace(epicentre=_epicentre(known))
-        _report_pairs(settings, folder, stations, coverage, region, known, report)
+        results = _results_of_run(settings, folder, stations, coverage, spectra)
+        _report_pairs(settings, folder, stations, results, report)
     context.progress("report", 1, 1)
     return report
+
+
+def _results_of_run(
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    coverage: Coverage,
+    spectra: xr.Dataset | None,
+) -> Results:
+    """Return the results of a run but for its table of pairs."""
+    shakemap = settings.records.shakemap if settings.records else None
+    region = run_region(settings, simulated_motion(settings, stations), spectra)
+    known = event_of_run(folder / "run.json", region, shakemap)
+    if region.epicentre is None:
+        region = region._replace(epicentre=_epicentre(known))
+    language, revision = settings.report.language, revision_of_run(folder / "run.json")
+    number = settings.report.revision or revision.number
+    return Results(
+        "risk", region, coverage, language, revision._replace(number=number),
+        event_sentences(known, language),
+        stations=station_rows(folder / "stations.csv", stations),
+        drawings=read_drawings(folder / WORST_PAIRS), provenance=_provenance(settings),
+        class_limits=settings.screening.classes,
+    )  # fmt: skip
 
 
 def run_region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Region:
@@ -103,105 +141,208 @@ def _epicentre(known: Mapping[str, Any]) -> tuple[float, float] | None:
     return (longitude, latitude) if is_known else None
 
 
-def _report_pairs(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    coverage: Coverage,
-    region: Region,
-    known: Mapping[str, Any],
-    report: Report,
-) -> None:
-    """Write everything that shows pairs; ``known`` are the facts of the earthquake."""
-    outlines = outlines_beside(
-        settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
-    )
-    results = _results_of_run(settings, folder, coverage, region, known)
-    results, reader = _with_pairs(settings, folder, results, outlines, report)
-    # Totals, layers and the comparison with observations need no record
-    report.outputs.extend(write_evaluation(reader.observed, folder, region.simulated))
-    write_files(results, folder, settings.spreadsheet, report)
-    write_overview(results, folder, report)
-    _draw_worst_pair(differing_pair(results.worst), stations, folder, report)
-    with report.tried(folder / "report.html"):
-        page = with_page_data(results, folder, outlines)
-        drawings = page_drawings(settings, results.worst, stations)
-        table = station_rows(folder / "stations.csv", stations)
-        write_page(replace(page, stations=table, drawings=drawings), folder / "report.html")
-
-
-def _with_pairs(
-    settings: Run, folder: Path, results: Results, outlines: Path | None, report: Report
-) -> tuple[Results, TableReader]:
-    """Return the results with their pairs, and what was read of all."""
-    is_whole = settings.geopackage or settings.spreadsheet
-    columns = None if is_whole else needed_columns(settings.totals)
-    with ranked_table(table_files(folder), columns) as table:
-        # The pieces may lack columns, the pairs of the page have all of them
-        results = replace(results, worst=worst_pairs(table, settings))
-        reader = TableReader(results.region.classes, settings.totals, table.pairs, is_whole=False)
-        results = read_table(
-            results, reader, table.pieces(), folder, outlines, settings.geopackage, report
-        )
-        return results, reader
-
-
-def _results_of_run(
-    settings: Run, folder: Path, coverage: Coverage, region: Region, known: Mapping[str, Any]
-) -> Results:
-    """Return the results of a run but for its table of pairs."""
-    language, revision = settings.report.language, revision_of_run(folder / "run.json")
-    number = settings.report.revision or revision.number
-    return Results(
-        "risk", region, coverage, language, revision._replace(number=number),
-        event_sentences(known, language), stations=read_stations(folder / "stations.csv"),
-        provenance=_provenance(settings), class_limits=settings.screening.classes,
-    )  # fmt: skip
-
-
-def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
-    """Return the worst pairs of a risk table with all columns and their areas."""
-    # The leading columns are those of the package, those of the inventory follow
-    area = [settings.totals.area] if settings.totals.area else []
-    names = table.schema.names[: 2 * MOST_COLUMNS]
-    worst = table.first(PAGE_PAIRS, [*names, *area])
-    return with_areas(worst, worst, settings.totals)
-
-
-def _draw_worst_pair(
-    worst: "pd.Series[Any] | None",
-    stations: Sequence[FinishedStation],
-    folder: Path,
-    report: Report,
-) -> None:
-    """Draw a pair from its record to pounding; nothing where no pair has a record."""
-    if worst is None:
-        return
-    # Only here a station's motion is needed again
-    name, walk = worst["station"].strip("."), folder / "figures" / "worst_pair.png"
-    (station,) = (station for station in stations if station.shard and station.shard.stem == name)
-    assert station.shard is not None  # chosen so
-    motion = read_station_once(station.shard, station.hash)
-    with report.tried(walk):
-        draw_record_to_pair(motion, worst, walk, note=DIFFERING)
-
-
 def _number(value: Any) -> float:
     """Return a number of a status file, NaN where there is none."""
     is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return float(value) if is_number else math.nan
 
 
+def _report_pairs(
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    results: Results,
+    report: Report,
+) -> None:
+    """Write everything that shows the pairs of a run."""
+    is_whole = settings.geopackage or settings.spreadsheet
+    columns = None if is_whole else needed_columns(settings.totals)
+    outlines = outlines_beside(
+        settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
+    )
+    with ranked_table(table_files(folder), columns) as table:
+        # The pieces may lack columns, the pairs of the page have all of them
+        worst = worst_pairs(table, settings.totals)
+        pairs = PairTable(
+            table.pieces(), table.pairs, settings.totals, outlines,
+            settings.geopackage, settings.spreadsheet,
+        )  # fmt: skip
+        results = replace(results, worst=worst, record=_record(worst, stations))
+        write_report(results, pairs, folder, report)
+
+
+def worst_pairs(table: RankedTable, totals: Totals) -> pd.DataFrame:
+    """Return the worst pairs of a risk table with all columns and their areas."""
+    # The leading columns are those of the package, those of the inventory follow
+    area = [totals.area] if totals.area else []
+    names = table.schema.names[: 2 * MOST_COLUMNS]
+    worst = table.first(PAGE_PAIRS, [*names, *area])
+    return with_areas(worst, worst, totals)
+
+
+def _record(worst: pd.DataFrame, stations: Sequence[FinishedStation]) -> xr.Dataset | None:
+    """Return the station file of the pair that is drawn, None where no pair has a record."""
+    pair = differing_pair(worst)
+    if pair is None:
+        return None
+    name = file_stem(pair["station"])
+    # Only here a station's motion is needed again
+    (station,) = (station for station in stations if station.shard and station.shard.stem == name)
+    assert station.shard is not None  # chosen so
+    return read_station_once(station.shard, station.hash)
+
+
 def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return the provenance of the results as pairs of title and text."""
     # Everything else is in the files next to the page
-    language = settings.report.language
-    texts = LANGUAGES[language]
+    texts = LANGUAGES[settings.report.language]
     has_map = settings.records is not None and settings.records.shakemap is not None
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [
-        made_with(language),
+        _made_with(texts),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
-        content_note([LANGUAGES[language]["page_shakemap"]] if has_map else [], language),
+        _content_note([texts["page_shakemap"]] if has_map else [], texts),
     ]
+
+
+def _made_with(texts: Mapping[str, str]) -> tuple[str, str]:
+    """Return the software version as title and text of the provenance."""
+    return texts["made_with"], f"per_obspy {version('per_obspy')}"
+
+
+def _content_note(notes: Sequence[str], texts: Mapping[str, str]) -> tuple[str, str]:
+    """Return sentences on the content of the page, and the source of its towns, as provenance."""
+    return texts["page_content"], " ".join([*notes, texts["page_places"]])
+
+
+def report_design(
+    settings: Design, table: pd.DataFrame, coverage: Coverage, folder: Path
+) -> Report:
+    """
+    Write page, summary, totals, overview, KML, layers and workbook of a design spectrum.
+
+    Parameters
+    ----------
+    settings : Design
+        Settings of the screening.
+    table : DataFrame
+        From :func:`per_obspy.screening.design.design_table`.
+    coverage : Coverage
+        Rows of the pair table, and those that are left out.
+    folder : Path
+        Of the results.
+
+    Raises
+    ------
+    CatalogError
+        If the pair table lacks the column of the areas.
+    """
+    report = Report([], [])
+    if table.empty:
+        return report
+    if settings.totals.area and settings.totals.area not in table:
+        reason = f"area: the pair table has no column {settings.totals.area!r}"
+        raise CatalogError("totals", reason)
+    # The spectrum replaces the earthquake
+    classes, language = list(settings.screening.classes), settings.report.language
+    texts, spectrum = LANGUAGES[language], name_text(settings.spectrum.name)
+    region = _region(texts["spectrum_title"].format(name=spectrum), classes, simulated=False)
+    results = Results(
+        "design", region, coverage, language, Revision(), [texts["spectrum"].format(name=spectrum)],
+        own=list(DESIGN), class_limits=settings.screening.classes,
+        provenance=[_made_with(texts), _content_note([texts["page_design"]], texts)],
+    )  # fmt: skip
+    pairs = PairTable(
+        iter([_with_flags(table)]), len(table), settings.totals, outlines_beside(settings.pairs),
+        settings.geopackage, settings.spreadsheet,
+    )  # fmt: skip
+    write_report(results, pairs, folder, report)
+    return report
+
+
+def _with_flags(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with the flags of its pairs that need no record."""
+    derived = np.where(table["derived"].fillna("") != "", "derived_inputs", "")
+    touching = np.where(table["gap"] == 0.0, "touching", "")
+    return table.assign(flags=pd.Series(derived + " " + touching, table.index).str.strip())
+
+
+def report_ensemble(
+    settings: Ensemble, folder: Path, simulated: bool, coverage: Coverage, runs: ScenarioRuns
+) -> Report:
+    """
+    Write page, summary, totals, overview, KML, layers and workbook of an ensemble.
+
+    An ensemble has no limits of states and classes of its own: those of a run's defaults are used.
+
+    Parameters
+    ----------
+    settings : Ensemble
+        Settings of the ensemble.
+    folder : Path
+        With ``ensemble.parquet``.
+    simulated : bool
+        Whether the motion of a scenario is simulated.
+    coverage : Coverage
+        Rows of the pair tables, and those that have a probability in every scenario.
+    runs : ScenarioRuns
+        Runs of the scenarios, which know buildings, stations and records.
+    """
+    report, table = Report([], []), folder / "ensemble.parquet"
+    if not coverage.screened:
+        return report
+    # The scenarios replace the earthquake
+    limits, language = ScreeningSettings(), settings.report.language
+    texts, classes, stations = LANGUAGES[language], list(limits.classes), runs.stations()
+    region = _region(settings.name, classes, simulated, stations)
+    with report.tried(folder / WORST_PAIRS), ranked_table([table]) as ranked:
+        write_drawings(Drawings(histories=runs.histories(ranked)), folder / WORST_PAIRS)
+    results = Results(
+        "ensemble", region, coverage, language, Revision(), _scenario_sentences(settings),
+        stations=stations, drawings=read_drawings(folder / WORST_PAIRS),
+        own=list(ensemble_columns(settings.weights, settings.yearly)), class_limits=limits.classes,
+        provenance=[_made_with(texts), _content_note([texts["page_ensemble"]], texts)],
+    )  # fmt: skip
+    # Buildings and outlines are those of the runs
+    pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))
+    pairs = PairTable(
+        pieces, coverage.screened, runs.totals(), runs.outlines(),
+        settings.geopackage, settings.spreadsheet,
+    )  # fmt: skip
+    write_report(results, pairs, folder, report)
+    return report
+
+
+def _scenario_sentences(settings: Ensemble) -> list[str]:
+    """Return sentences on the number of scenarios, and the names of the first ones."""
+    texts = LANGUAGES[settings.report.language]
+    sentence = texts["scenario_rate" if settings.yearly else "scenario_weight"]
+    return [
+        texts["scenarios"].format(count=len(settings.weights)),
+        *(
+            sentence.format(name=name_text(name), value=f"{value:g}")
+            for name, value in [*settings.weights.items()][:5]
+        ),
+    ]
+
+
+def _region(
+    title: str, classes: Sequence[str], simulated: bool, stations: pd.DataFrame | None = None
+) -> Region:
+    """Return a region with the stations that are used, if there are any."""
+    places = pd.DataFrame({"longitude": [], "latitude": []}, dtype="float64")
+    if stations is not None and len(stations):
+        used = stations[stations["state"] == "used"]
+        places = used[["longitude", "latitude"]].drop_duplicates()
+    return Region(title, classes, simulated, places)
+
+
+def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFrame:
+    """Return rows of an ensemble with the state and class of their probability and severity."""
+    chance = piece["probability"].to_numpy(np.float64)
+    velocity = piece["expected_impact_velocity"].to_numpy(np.float64)
+    return piece.assign(
+        state=pounding_state(chance, limits.states),
+        risk_class=risk_class(velocity, limits.classes),
+    )

@@ -15,7 +15,14 @@ from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress, silent
 from per_obspy.results.ranked_table import table_outputs
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
-from per_obspy.runs.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
+from per_obspy.runs.output_folder import (
+    RECORD,
+    STATIONS,
+    UNFINISHED,
+    WORST_PAIRS,
+    Result,
+    locked_folder,
+)
 from per_obspy.runs.provenance import RunSettings
 from per_obspy.runs.tasks.parallel import Workers, prepare_workers
 
@@ -171,8 +178,10 @@ def _finished(file: Path) -> dict[str, Any]:
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
-    spectra = {name: one for name, one in record["outputs"].items() if name == "spectra.nc"}
-    needed = table_outputs(record["outputs"]) | spectra
+    others = {
+        name: one for name, one in record["outputs"].items() if name in ("spectra.nc", WORST_PAIRS)
+    }
+    needed = table_outputs(record["outputs"]) | others
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
         raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")

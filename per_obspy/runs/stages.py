@@ -30,7 +30,7 @@ from per_obspy.runs.output_folder import (
 from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.provenance import RunContext, RunSettings
 from per_obspy.runs.record import KnownStations, RunRecord, earlier_facts, station_facts
-from per_obspy.runs.report import reported
+from per_obspy.runs.report import explained, reported
 from per_obspy.runs.screening import Screened, screened
 from per_obspy.runs.stations import (
     all_rejections,
@@ -170,15 +170,18 @@ def _later_stages(
         found = screened(context, usable, rejected)
         spectra = [station.spectra for station in usable if station.spectra is not None]
         table = write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
+        worst = explained(context, usable)
     # Everything that is read from them
     with timed(record.seconds, "report"):
         report = reported(context, usable, found.coverage)
     record = _with_counts(record, settings, found, stations, known)
+    faults = [*worst.faults, *report.faults]
+    files = [*found.outputs, *table.files, *worst.outputs, *report.outputs]
     return replace(
         record,
         # A picture or layer that failed is made by the next run
-        failed=record.failed or bool(report.faults),
-        faults=report.faults,
+        failed=record.failed or bool(faults),
+        faults=faults,
         alert=report.alert,
         engine=engine_facts(executor),
         simulated=simulated_motion(settings, usable),
@@ -186,7 +189,7 @@ def _later_stages(
         pair_tables=found.pair_tables.as_record(),
         coverage=found.coverage.as_record(),
         versions=software_versions(),
-        outputs=file_hashes(folder, [*found.outputs, *table.files, *report.outputs]),
+        outputs=file_hashes(folder, files),
     )
 
 

@@ -22,7 +22,7 @@ from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
 from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.record import KnownStations
-from per_obspy.runs.results.run_facts import with_event
+from per_obspy.runs.run_facts import with_event
 from per_obspy.runs.tasks.parallel import Workers, finish
 from per_obspy.runs.tasks.station import FinishedStation, StationTask, earlier_station
 from per_obspy.screening.amplitudes import Earthquake

@@ -6,6 +6,7 @@ standard deviation on both sides of the median of a normal variable. Everything 
 stays as uncertain as it is, and the row is computed again as the risk table computes it.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -91,9 +92,11 @@ def input_sensitivity(
     by_name = found.set_index("pair_id")[["probability", "state"]]
     same = _same(known, by_name)
     return [
-        _outcome(known["pair_id"].iloc[row], name, (low[row], high[row]), by_name, row)
+        outcome
         for name, (low, high, varies) in inputs.items()
-        for row in np.flatnonzero(varies & same & _found(known, name, by_name)).tolist()
+        for outcome in _outcomes(
+            known, name, (low, high, varies & same & _found(known, name, by_name)), by_name
+        )
     ]
 
 
@@ -127,14 +130,18 @@ def _same(known: pd.DataFrame, found: pd.DataFrame) -> BoolArray:
     return np.asarray(np.abs(again - values(known, "probability")) <= TOLERANCE)
 
 
-def _outcome(
-    pair_id: str, name: str, ends: tuple[float, float], found: pd.DataFrame, row: int
-) -> Sensitivity:
-    """Return the outcome of one pair at both values of an input."""
-    variants = found.loc[[f"{row} {name} {side}" for side in (0, 1)]]
-    low, high = values(variants, "probability").tolist()
-    states = variants["state"].astype(str).tolist()
-    return Sensitivity(pair_id, name, float(ends[0]), float(ends[1]), low, high, *states)
+def _outcomes(
+    known: pd.DataFrame, name: str, ends: Ends, found: pd.DataFrame
+) -> Iterator[Sensitivity]:
+    """Yield the outcome of each chosen pair at both values of an input."""
+    low, high, chosen = ends
+    rows = np.flatnonzero(chosen)
+    sides = [found.loc[[f"{row} {name} {side}" for row in rows.tolist()]] for side in (0, 1)]
+    chances = [values(side, "probability").tolist() for side in sides]
+    states = [side["state"].astype(str).tolist() for side in sides]
+    columns = (low[rows].tolist(), high[rows].tolist(), *chances, *states)
+    for pair_id, *outcome in zip(known["pair_id"].iloc[rows], *columns, strict=True):
+        yield Sensitivity(pair_id, name, *outcome)
 
 
 def _as_given(rows: pd.DataFrame) -> pd.DataFrame:

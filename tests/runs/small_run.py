@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from per_obspy.files import written_whole
+from per_obspy.report import files as report_files
 from per_obspy.report.results import Drawings
 from per_obspy.runs import report
-from per_obspy.runs.results import report_files
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -65,10 +65,10 @@ def plain_figure(*arguments: object, **_: object) -> None:
 #: Functions that draw, and those that write short files instead; those of the page are the last.
 PLAIN = (
     (report_files, "draw_overview", plain_figure),
-    (report, "draw_record_to_pair", plain_figure),
+    (report_files, "draw_record_to_pair", plain_figure),
     (report_files, "write_summary_page", plain_figure),
     (report, "page_drawings", lambda *_: Drawings()),
-    (report, "write_page", plain_figure),
+    (report_files, "write_page", plain_figure),
 )
 REAL = tuple((module, name, getattr(module, name)) for module, name, _ in PLAIN)
 

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 
 from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
-from per_obspy.runs.results.shown_pair import find_pair
 from per_obspy.runs.run import report, run, screen
 from per_obspy.runs.screening import SMALLEST_CHUNK, _chunk_rows
+from per_obspy.runs.shown_pair import find_pair
 from per_obspy.runs.tasks import chunk
 from per_obspy.screening.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra

@@ -29,8 +29,7 @@ from watched_city import FakeClock, city_earthquake, settings_of, write_city  # 
 
 from per_obspy.config import Notify  # noqa: E402 - after the path
 from per_obspy.files import is_part  # noqa: E402 - after the path
-from per_obspy.runs import report  # noqa: E402 - after the path
-from per_obspy.runs.results import report_files  # noqa: E402 - after the path
+from per_obspy.report import files as report_files  # noqa: E402 - after the path
 from per_obspy.simulation.earthquake import Simulation  # noqa: E402 - after the path
 from per_obspy.watch.watch import watch_once  # noqa: E402 - after the path
 
@@ -41,7 +40,7 @@ TABLES = (*TABLES, "totals.csv", "event.xml")
 #: Functions that write a figure, which is most of the time of a small run and not compared.
 FIGURES = (
     (report_files, "draw_overview"),
-    (report, "draw_record_to_pair"),
+    (report_files, "draw_record_to_pair"),
     (report_files, "write_summary_page"),
 )
 

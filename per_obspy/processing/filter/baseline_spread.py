@@ -13,8 +13,6 @@ import numpy as np
 from scipy.fft import irfft
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import detrend
-from scipy.signal.windows import tukey
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
@@ -127,6 +125,8 @@ def _corrected(
     settings: Processing,
 ) -> FloatArray:
     """Return the filtered record after each correction: sums of it and of steps at the times."""
+    from scipy.signal.windows import tukey  # in workers only, see instrument_response
+
     parts = np.vstack([plain, time >= times[:, np.newaxis]])
     parts *= tukey(plain.size, 2 * settings.taper)
     filtered = _filtered(parts, float(time[1]), highpass, settings.order)
@@ -140,6 +140,8 @@ def _log_per(motions: Iterable[FloatArray], interval: float) -> FloatArray:
 
 def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
     """Return the velocity that a shift leaves before and after the shaking, without a line, m/s."""
+    from scipy.signal import detrend  # in workers only, see instrument_response
+
     left, before = [], time <= shaking.onset
     # The record as it is, or without its straight line: the smaller one
     for straight in (samples, detrend(samples)):

@@ -100,12 +100,15 @@ def _thinned(history: PoundingHistory) -> dict[str, Any]:
 
 def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
     """Return time, s, and approach velocity, m/s, of the fastest impacts that count."""
-    counted = impacts[impacts["counted"].to_numpy(dtype=bool)]
-    speed = counted["velocity_before_1"] - counted["velocity_before_2"]
-    fastest = pd.DataFrame({"time": counted["time"], "speed": speed}).nlargest(
-        MOST_IMPACTS, "speed"
+    time, counted, one, two = (
+        impacts[name].to_numpy()
+        for name in ("time", "counted", "velocity_before_1", "velocity_before_2")
     )
-    return fastest.round(3).to_numpy().tolist()
+    speed = one - two
+    order = np.argsort(-speed, kind="stable")
+    fastest = order[counted[order]][:MOST_IMPACTS]
+    rows: list[list[float]] = np.stack([time[fastest], speed[fastest]], axis=1).round(3).tolist()
+    return rows
 
 
 def _displacements(displacement: FloatArray, edges: Any) -> list[float]:

@@ -22,6 +22,8 @@ LOADED = (
     "per_obspy.runs.tasks.chunk",
     "per_obspy.runs.tasks.building_rows",
     "obspy.taup",
+    "obspy.signal.invsim",
+    "obspy.signal.trigger",
 )
 
 #: Whether workers of this process are forks of its server.

@@ -1,7 +1,7 @@
 """
 The page of a run, from its results.
 
-Tests of per_obspy.runs.report, per_obspy.runs.results.drawings and
+Tests of per_obspy.runs.report, per_obspy.runs.worst_pairs and
 per_obspy.report.page.drawings.
 """
 
@@ -13,10 +13,10 @@ import pandas as pd
 import pytest
 
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.runs.results import report_files
+from per_obspy.report import files as report_files
 from per_obspy.runs.run import report
 
-from ..small_run import page_content, write_configuration
+from .small_run import page_content, write_configuration
 
 pytestmark = pytest.mark.usefixtures("plain_figures")
 

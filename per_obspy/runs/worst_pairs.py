@@ -1,5 +1,10 @@
-"""Drawings of the page of a run: stations, histories and sensitivities of some of its pairs."""
+"""
+What explains the worst pairs of a run: their histories, sensitivities, and records of stations.
 
+They are computed once, after the screening, and kept in ``worst_pairs.json``.
+"""
+
+import json
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -9,9 +14,10 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.config import Run
+from per_obspy.files import written_whole
 from per_obspy.report.page.drawings import HISTORY_COLUMNS, drawn_history, drawn_station
 from per_obspy.report.results import Drawings
-from per_obspy.runs.results.run_facts import read_stations
+from per_obspy.runs.run_facts import read_stations
 from per_obspy.runs.screening import shakemap_files
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import ground_files, read_ground, read_station_once
@@ -95,6 +101,24 @@ def pair_histories(
             if history is not None:
                 histories[int(pair["rank"])] = history
     return histories
+
+
+def write_drawings(drawings: Drawings, path: Path) -> None:
+    """Write ``worst_pairs.json``, whole or not at all."""
+    with written_whole(path) as part:
+        part.write_text(json.dumps(drawings._asdict(), allow_nan=False), encoding="utf-8")
+
+
+def read_drawings(path: Path) -> Drawings:
+    """Read what :func:`write_drawings` wrote; nothing where there is no such file."""
+    if not path.is_file():
+        return Drawings()
+    known = Drawings(**json.loads(path.read_text(encoding="utf-8")))
+    # Ranks are texts in JSON
+    return known._replace(
+        histories={int(rank): history for rank, history in known.histories.items()},
+        sensitivity={int(rank): rows for rank, rows in known.sensitivity.items()},
+    )
 
 
 def page_drawings(

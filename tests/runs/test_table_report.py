@@ -1,7 +1,7 @@
 """
 Every kind of screening has its summary, overview, layers and workbook, and its pairs are shown.
 
-Tests of per_obspy.runs.results and of per_obspy.cli.show, through the commands.
+Tests of per_obspy.runs.report and of per_obspy.cli.show, through the commands.
 """
 
 import csv
@@ -18,14 +18,14 @@ import pytest
 from pyarrow import parquet
 
 from per_obspy.config import Totals
+from per_obspy.report.files import Report, TableReader, write_lists
 from per_obspy.report.results import Region, Results
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import ranked_table
-from per_obspy.runs.results.report_files import Report, TableReader, write_files
-from per_obspy.runs.results.run_facts import event_of_run
+from per_obspy.runs.run_facts import event_of_run
 
-from ...report.page.made_up import CLASSES, pair_table
-from ..small_run import page_content
+from ..report.page.made_up import CLASSES, pair_table
+from .small_run import page_content
 
 SCENARIO = "[scenario]\nstations = 1\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 4\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -224,7 +224,7 @@ def test_a_pair_of_an_ensemble_is_shown_in_words(done, call):
 
 
 def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
-    module = "per_obspy.runs.results.report_files"
+    module = "per_obspy.report.files"
     monkeypatch.setattr(f"{module}.KML_ROWS", 2)
     monkeypatch.setattr("per_obspy.report.layers.kml.ROWS", 2)
     monkeypatch.setattr(f"{module}.SHEET_ROWS", 3)
@@ -235,7 +235,7 @@ def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
     results = Results(
         "risk", region, Coverage(5, 5), tally=reader.tally, listed=reader.listed, shown=reader.shown
     )
-    write_files(results, tmp_path, True, report)
+    write_lists(results, tmp_path, True, report)
     assert report.faults == []
     kml = (tmp_path / "risk.kml").read_text()
     assert "The worst 2 of 5 pairs; all of them are in risk.parquet." in kml

@@ -1,4 +1,8 @@
-"""Files of a report of any screening: its table is read once, then each file is written."""
+"""
+Files of a report of any screening: its table is read once, then each file is written.
+
+Page, summary, figures, layers and workbook read one `Results` and nothing else.
+"""
 
 import csv
 from collections import deque
@@ -6,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +20,21 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
 from per_obspy.errors import CatalogError, PerError
 from per_obspy.files import remove_file
+from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.layers.kml import ROWS as KML_ROWS
 from per_obspy.report.layers.kml import write_kml
 from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
-from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
+from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS, write_page
 from per_obspy.report.page.map_lines import lines_around, read_outlines
 from per_obspy.report.page.packing import MOST_COLUMNS
+from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
 from per_obspy.report.results import Results
 from per_obspy.report.statements import alert_line
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.tally import COUNTED, PAGE_PAIRS, PairTally
-from per_obspy.report.texts import LANGUAGES
 from per_obspy.results.ranked_table import table_name
 from per_obspy.results.station_summary import COLUMNS as STATION_COLUMNS
 from per_obspy.results.totals import (
@@ -101,6 +105,33 @@ class Report:
             self.faults.append(f"{paths[0]}: cannot be drawn: {type(error).__name__} {reason:.200}")
         else:
             self.outputs.extend(paths)
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """
+    The ranked pairs of a screening, and what is written of them.
+
+    Attributes
+    ----------
+    pieces : iterator of DataFrame
+        Its rows, worst first; with all columns, unless the results have their worst pairs already.
+    pairs : int
+        Number of its rows.
+    totals : Totals
+        Areas by which the pairs are counted.
+    outlines : Path or None
+        Outlines of the buildings, from :func:`outlines_beside`.
+    geopackage, spreadsheet : bool
+        Whether the layers, and the workbook, are written; both need optional libraries.
+    """
+
+    pieces: Iterator[pd.DataFrame]
+    pairs: int
+    totals: Totals
+    outlines: Path | None
+    geopackage: bool
+    spreadsheet: bool
 
 
 class TableReader:
@@ -212,51 +243,56 @@ def outlines_beside(*pairs: Path | None) -> Path | None:
     return None
 
 
-def read_table(
-    results: Results,
-    reader: TableReader,
-    pieces: Iterator[pd.DataFrame],
-    folder: Path,
-    outlines: Path | None,
-    geopackage: bool,
-    report: Report,
-) -> Results:
+def write_report(results: Results, table: PairTable, folder: Path, report: Report) -> None:
     """
-    Read a ranked table once, write its layers and totals, and return the results with its rows.
+    Write everything that shows the results of a screening; a file that fails leaves the others.
 
     Parameters
     ----------
     results : Results
         Everything that is not in the table.
-    reader : TableReader
-        Takes the pieces.
-    pieces : iterator of DataFrame
-        Rows of the table, worst first.
+    table : PairTable
+        The pairs.
     folder : Path
         Of the results.
-    outlines : Path or None
-        Outlines of the buildings, from :func:`outlines_beside`.
-    geopackage : bool
-        Whether the layers are written.
     report : Report
-        Takes files and faults.
+        Takes files, faults and alert.
 
     Raises
     ------
     CatalogError
         If the table ends too early.
     """
-    rows = reader.read(pieces)
-    if geopackage:
+    reader = TableReader(results.region.classes, table.totals, table.pairs, results.worst.empty)
+    results = read_table(results, reader, table, folder, report)
+    if results.stem == "risk":
+        observed, simulated = reader.observed, results.region.simulated
+        report.outputs.extend(write_evaluation(observed, folder, simulated))
+    # What people open first comes first
+    report.alert = alert_line(results)
+    write_summaries(results, folder, report)
+    with report.tried(folder / "report.html"):
+        page = with_page_data(results, folder, table.outlines)
+        write_page(page, folder / "report.html")
+    write_lists(results, folder, table.spreadsheet, report)
+    _draw_figures(results, folder, report)
+
+
+def read_table(
+    results: Results, reader: TableReader, table: PairTable, folder: Path, report: Report
+) -> Results:
+    """Read a table once, write its layers and totals, and return the results with its rows."""
+    rows = reader.read(table.pieces)
+    if table.geopackage:
         names = (f"{results.stem}.{suffix}" for suffix in ("gpkg", "qgz", "geoparquet"))
         package, project, parquet = (folder / name for name in names)
         with report.tried(package, project, parquet):
-            _write_layers(rows, results, reader, outlines, (package, project, parquet))
+            _write_layers(rows, results, reader, table.outlines, (package, project, parquet))
     # All rows, or those that a layer left when it failed; a table that fails is a fault
     deque(rows, maxlen=0)
     if reader.tally.pairs != reader.pairs:
-        table = folder / table_name(folder, results.stem)
-        raise CatalogError(str(table), "cannot be read to its end: run again")
+        file = folder / table_name(folder, results.stem)
+        raise CatalogError(str(file), "cannot be read to its end: run again")
     areas = reader.region_totals(folder).table
     write_totals(areas, folder / "totals.csv")
     report.outputs.append(folder / "totals.csv")
@@ -313,28 +349,17 @@ def _count_hit(file: pq.ParquetFile) -> int:
     )
 
 
-def write_files(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
-    """
-    Write summary, KML and workbook; a file that fails leaves the others.
-
-    Parameters
-    ----------
-    results : Results
-        From :func:`read_table`.
-    folder : Path
-        Of the results.
-    spreadsheet : bool
-        Whether a workbook is written, for which an optional library is needed.
-    report : Report
-        Takes files and faults.
-    """
-    stem, region = results.stem, results.region
-    report.alert = alert_line(results)
-    # Words first
+def write_summaries(results: Results, folder: Path, report: Report) -> None:
+    """Write the summary as text and as one page of PDF."""
     with report.tried(folder / "summary.txt"):
         write_text(results, folder / "summary.txt")
     with report.tried(folder / "summary.pdf"):
         write_summary_page(results, folder / "summary.pdf")
+
+
+def write_lists(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
+    """Write the worst pairs as KML and, where it is wanted, as a workbook."""
+    stem, region = results.stem, results.region
     with report.tried(folder / f"{stem}.kml"):
         note = _extent(results, folder, KML_ROWS)
         write_kml(results.listed, region.classes, region.title, folder / f"{stem}.kml", note)
@@ -344,11 +369,15 @@ def write_files(results: Results, folder: Path, spreadsheet: bool, report: Repor
             write_workbook(sheets, folder / f"{stem}.xlsx")
 
 
-def write_overview(results: Results, folder: Path, report: Report) -> None:
-    """Draw the map of all pairs."""
-    overview = folder / "figures" / "overview.png"
+def _draw_figures(results: Results, folder: Path, report: Report) -> None:
+    """Draw the map of all pairs, and a pair from its record to pounding where one has a record."""
+    overview, walk = (folder / "figures" / f"{name}.png" for name in ("overview", "worst_pair"))
     with report.tried(overview):
         draw_overview(results.shown, results.region, overview)
+    pair = differing_pair(results.worst)
+    if results.record is not None and pair is not None:
+        with report.tried(walk):
+            draw_record_to_pair(results.record, pair, walk, note=DIFFERING)
 
 
 def _extent(results: Results, folder: Path, most: int) -> str:
@@ -414,14 +443,3 @@ def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
                 if count <= MOST_ROWS and len(row) == len(REJECTED_COLUMNS):
                     rows.append(row)
     return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
-
-
-def made_with(language: str) -> tuple[str, str]:
-    """Return the software version as title and text of the provenance."""
-    return LANGUAGES[language]["made_with"], f"per_obspy {version('per_obspy')}"
-
-
-def content_note(notes: Sequence[str], language: str) -> tuple[str, str]:
-    """Return sentences on the content of the page, and the source of its towns, as provenance."""
-    texts = LANGUAGES[language]
-    return texts["page_content"], " ".join([*notes, texts["page_places"]])

@@ -10,13 +10,13 @@ import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
 from per_obspy.inventory.schema import ROW_SUSPICIONS
+from per_obspy.report.files import outlines_beside
 from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
-from per_obspy.results.ranked_table import ROWS, table_files
+from per_obspy.results.ranked_table import ROWS, RankedTable, table_files
 from per_obspy.results.totals import PLACE
-from per_obspy.runs.results.drawings import HISTORIES, pair_histories, station_rows
-from per_obspy.runs.results.report_files import outlines_beside
 from per_obspy.runs.stations import stations_of_earlier_run
+from per_obspy.runs.worst_pairs import HISTORIES, pair_histories, station_rows
 
 #: Columns of a risk table that do not depend on the motion.
 OF_BUILDINGS = (
@@ -119,17 +119,11 @@ class ScenarioRuns:
         ]
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
-    def histories(self, worst: pd.DataFrame) -> dict[int, dict[str, Any]]:
-        """
-        Return histories of the worst pairs, each in its worst scenario, by rank.
-
-        Parameters
-        ----------
-        worst : DataFrame
-            Pairs of the ensemble with ``rank, pair_id, worst_scenario``.
-        """
+    def histories(self, ensemble: RankedTable) -> dict[int, dict[str, Any]]:
+        """Return histories of the worst pairs, each in its worst scenario, by rank."""
         found = dict[int, dict[str, Any]]()
-        for name, pairs in worst.head(HISTORIES).groupby("worst_scenario", sort=False):
+        worst = ensemble.first(HISTORIES, ["rank", "pair_id", "worst_scenario"])
+        for name, pairs in worst.groupby("worst_scenario", sort=False):
             run = self.runs.get(str(name))
             if run is not None:
                 rows = _rows_of(run.risk, pairs["pair_id"].tolist())

@@ -1,1 +1,0 @@
-"""Results to read: page, summary, layers and workbook of every kind of screening."""
