@@ -71,6 +71,15 @@ class Run(Section):
         return self
 
     @model_validator(mode="after")
+    def _known_classes(self) -> Self:
+        for number, group in enumerate(self.notify.groups):
+            if group.least_class not in self.screening.classes:
+                classes = ", ".join(self.screening.classes)
+                key = f"notify.groups.{number}.least_class"
+                raise ValueError(f"{key}: {group.least_class!r} is none of {classes}")
+        return self
+
+    @model_validator(mode="after")
     def _comparable_stations(self) -> Self:
         dampings = self.spectra.dampings
         if not dampings[0] <= REFERENCE_DAMPING <= dampings[-1]:
