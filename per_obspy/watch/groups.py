@@ -10,7 +10,7 @@ import numpy as np
 from per_obspy.config import Run
 from per_obspy.config.watch import Group
 from per_obspy.errors import CatalogError, reason_of, require_extra, shortened
-from per_obspy.report.texts import LANGUAGES, counted
+from per_obspy.report.texts import LANGUAGES, in_context
 from per_obspy.results.ranked_table import table_files
 from per_obspy.watch.notification import Message
 
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
     Geometries = NDArray[np.object_]
+
+#: Texts of a message, translated in the catalogues of languages: what is new, and the sentences.
+FIRST, CHANGED = "first result", "before: {before}"
+BELOW = "no longer reaches your threshold; before: {before}"
+PAIRS = "Pairs of neighbouring buildings of class {least} or worse in {group}: {classes}."
+NOTE = (
+    "Pairs without a verdict are in no class. Where no message comes, nothing says that buildings "
+    "are safe."
+)
 
 #: Bytes of the largest file of an area.
 LARGEST_AREA = 64 * 2**20
@@ -134,7 +143,7 @@ def group_message(
     group: Group,
     name: str,
     counts: Mapping[str, int],
-    earlier: Mapping[str, int] | None,
+    earlier: Mapping[str, int],
     simulated: bool,
 ) -> Message | None:
     """
@@ -148,42 +157,33 @@ def group_message(
         Of the run.
     counts : mapping
         Pairs by class, of :func:`counts_of`.
-    earlier : mapping or None
-        Counts of the latest message to the group. One that fell below the threshold since then is
-        told so, once.
+    earlier : mapping
+        Counts of the latest message to the group, empty if there was none. A group that falls below
+        its threshold is told so, once.
     simulated : bool
         Whether the ground motion is simulated.
     """
-    is_told = earlier is not None and sum(earlier.values()) >= group.least_count
+    is_told = sum(earlier.values()) >= group.least_count
     is_reached = sum(counts.values()) >= group.least_count
     if counts == earlier or not (is_reached or is_told):
         return None
     # What is new is in the title: it is all that a small screen shows
     texts = LANGUAGES[group.language]
-    key = "group_first" if not is_told else "group_changed" if is_reached else "group_below"
-    change = texts[key].format(before=_words(earlier or {}, texts))
-    title = f"{name}: {group.name}: {_words(counts, texts)} ({change})"
-    lines = [texts["simulated"]] if simulated else []
-    lines += [_sentence(group, counts, texts), change, texts["group_note"]]
-    return Message("changed" if is_told else "first", title, "\n".join(lines), group=group)
-
-
-def _sentence(group: Group, counts: Mapping[str, int], texts: Mapping[str, str]) -> str:
-    """Return the number of pairs of a group as a sentence."""
     least = texts.get(f"class_{group.least_class}", group.least_class)
     facts = {"group": group.name, "least": least, "classes": _words(counts, texts)}
-    return counted(group.language, "group_pairs", sum(counts.values()), **facts)
+    facts["before"] = _words(earlier, texts)
+    change = FIRST if not is_told else CHANGED if is_reached else BELOW
+    # In the language of the group
+    change, pairs, note = (
+        in_context("message", text, group.language).format(**facts)
+        for text in (change, PAIRS, NOTE)
+    )
+    title = f"{name}: {group.name}: {facts['classes']} ({change})"
+    lines = [*([texts["simulated"]] if simulated else []), pairs, change, note]
+    return Message("changed" if is_told else "first", title, "\n".join(lines), group=group)
 
 
 def _words(counts: Mapping[str, int], texts: Mapping[str, str]) -> str:
     """Return pairs by class in words."""
     named = (f"{count} {texts.get(f'class_{name}', name)}" for name, count in counts.items())
     return ", ".join(named) or texts["alert_none"]
-
-
-def earlier_counts(latest: Mapping[str, Any], group: Group) -> dict[str, int] | None:
-    """Return the counts of the latest message to a group, None if there is none."""
-    groups = latest.get("groups")
-    found = groups.get(group.name) if isinstance(groups, dict) else None
-    is_whole = isinstance(found, dict) and all(isinstance(one, int) for one in found.values())
-    return found if is_whole else None

@@ -157,7 +157,9 @@ def _urls(settings: AppriseUrls) -> list[str]:
 
 def _private_text(file: Path) -> str:
     """Return the content of a file that only its owner may read."""
-    with open(file, "rb", opener=_opened_at_once) as opened:
+    # A pipe without a writer does not block
+    flags = getattr(os, "O_NONBLOCK", 0)
+    with open(file, "rb", opener=lambda path, more: os.open(path, more | flags)) as opened:
         # The rights are those of the file that is read, whatever its name leads to later
         facts = os.fstat(opened.fileno())
         if not stat.S_ISREG(facts.st_mode):
@@ -167,11 +169,6 @@ def _private_text(file: Path) -> str:
             raise _Undelivered(f"{file}: mode {mode:o} lets others read it: chmod 600 {file}")
         content: bytes = opened.read(LARGEST_FILE)
     return content.decode("utf-8")
-
-
-def _opened_at_once(path: str, flags: int) -> int:
-    """Open a file; a pipe without a writer does not block."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _ended(

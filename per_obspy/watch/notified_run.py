@@ -115,7 +115,7 @@ def _notify_groups(
     settings: Run, folder: Path, name: str, place: Path, simulated: bool
 ) -> tuple[str, ...]:
     """Notify each group whose pairs have changed and reach its threshold, or no longer do."""
-    from per_obspy.watch.groups import counts_of, earlier_counts, group_message
+    from per_obspy.watch.groups import counts_of, group_message
 
     failed = list[str]()
     for group in settings.notify.groups:
@@ -129,13 +129,23 @@ def _notify_groups(
             failed += _noted(folder, latest, [reason])
             continue
         # Each message is noted before the next one
-        known = earlier_counts(latest, group)
-        if message := group_message(group, name, counts, known, simulated):
-            groups = {**(latest.get("groups") or {}), group.name: counts}
+        told = _told_groups(latest)
+        earlier = told.get(group.name, {})
+        if message := group_message(group, name, counts, earlier, simulated):
             message = message._replace(report=_report_of(place))
-            facts = {"classes": latest.get("classes"), "groups": groups}
+            facts = {"classes": latest.get("classes"), "groups": {**told, group.name: counts}}
             failed += _sent(settings.notify, folder, message, facts)
     return tuple(failed)
+
+
+def _told_groups(latest: Mapping[str, Any]) -> dict[str, dict[str, int]]:
+    """Return the counts that each group was told last; damaged ones count as none."""
+    groups = latest.get("groups")
+    return {
+        name: counts
+        for name, counts in (groups if isinstance(groups, dict) else {}).items()
+        if isinstance(counts, dict) and all(isinstance(one, int) for one in counts.values())
+    }
 
 
 def _report_of(place: Path) -> Path:
@@ -179,9 +189,8 @@ def _sent(
     """Deliver a message, and write its subject and the failed ways of delivery."""
     reasons = notify(settings, message)
     # What groups were told last stays
-    groups = read_json(folder / LATEST).get("groups")
-    known = {"groups": groups} if groups else {}
-    latest = {"kind": message.kind, "time": now(), **known, **facts}
+    told = _told_groups(read_json(folder / LATEST))
+    latest = {"kind": message.kind, "time": now(), **({"groups": told} if told else {}), **facts}
     return _noted(folder, latest, reasons)
 
 

@@ -93,7 +93,7 @@ def test_a_message_that_fails_is_a_fact_and_no_error(tmp_path):
     assert latest["classes"] == {"red": 1}
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"classes": 3}'])
+@pytest.mark.parametrize("content", ["", "[]", '{"classes": 3, "groups": [1]}'])
 def test_a_damaged_latest_message_counts_as_none(tmp_path, sent, content):
     settings, messages = sent
     result = result_of(tmp_path / "out", ["red"])
@@ -152,14 +152,14 @@ def test_a_group_hears_of_its_area_from_its_threshold_on_and_of_changes_there_on
     title, text = first["w@x"]
     assert title == "Town: West: 1 high (first result)"
     assert text.startswith("SIMULATED ground motion")
-    assert "1 pair of neighbouring buildings is of class high or worse (1 high)." in text
+    assert "Pairs of neighbouring buildings of class high or worse in West: 1 high." in text
     assert "nothing says that buildings are safe" in text
     # A second one in the east, and one more low pair in the west, which hears nothing of it
     second = told(["high", "high", "high", "low", "low"], [0.5, 1.5, 1.6, 0.2, 0.3])
     assert list(second) == ["e@x"]
     title, text = second["e@x"]
     assert title == "Town: Este: 2 alta (primer resultado)"
-    assert "2 pares de edificios vecinos son de clase alta o peor (2 alta)." in text
+    assert "Pares de edificios vecinos de clase alta o peor en Este: 2 alta." in text
     # A severe one in the west, which is in quarter 7 as well; the east falls below its threshold
     third = told(["severe", "high", "low"], [0.5, 1.5, 0.2])
     assert {address: title for address, (title, _) in third.items()} == {

@@ -19,12 +19,13 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import Rejection, ServiceError, require_extra, shortened
-from per_obspy.files import is_part, remove_dead_parts
+from per_obspy.files import is_part, remove_dead_parts, remove_file
 from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
 from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
 from per_obspy.records.earthquakes.services import event_url, fetched_event
 from per_obspy.records.earthquakes.shakemap_product import (
+    STATUS,
     ShakeMapFiles,
     cached_shakemap,
     fetch_shakemap,
@@ -155,6 +156,9 @@ def _with_shakemap(
         found, is_complete, reason = known, False, str(error)
     if found and is_complete:
         return fetched._replace(shakemap=found)
+    # A map that was withdrawn serves no run
+    if found is None:
+        remove_file(request.cache / STATUS)
     url = public_url(event_url(request.event_provider))
     rows = (Rejection("service", "ShakeMap", url, None, (reason,)),)
     return fetched._replace(rejected=rows, is_complete=is_complete, shakemap=found)
