@@ -1,5 +1,16 @@
 """Physical constants, shared thresholds and defaults, each with its unit and source."""
 
+from importlib.resources import files
+
+#: Languages of the page, of summaries and of messages: one catalogue each.
+LANGUAGES = tuple(
+    sorted(
+        file.name.removesuffix(".po")
+        for file in (files("per_obspy") / "report" / "languages").iterdir()
+        if file.name.endswith(".po")
+    )
+)
+
 #: Standard acceleration of gravity, m/s2, by definition (CGPM 1901).
 STANDARD_GRAVITY = 9.80665
 

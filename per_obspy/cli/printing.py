@@ -5,12 +5,12 @@ import logging
 import sys
 from collections import Counter
 from contextlib import contextmanager, suppress
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from per_obspy.constants import LANGUAGES
 from per_obspy.errors import printable, shortened
 
 if TYPE_CHECKING:
@@ -171,16 +171,21 @@ WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
 BYSTANDER = "belongs to another earthquake"
 
 
-class PageLanguage(StrEnum):
-    """Languages of the page ``report.html`` and of the summaries."""
-
-    en = "en"
-    es = "es"
+def _language(name: str) -> str:
+    """Return a language of the page ``report.html`` and of the summaries."""
+    if name not in LANGUAGES:
+        raise typer.BadParameter(f"{name!r} is none of {', '.join(LANGUAGES)}")
+    return name
 
 
 Language = Annotated[
-    PageLanguage | None,
-    typer.Option("--language", help="Of report.html and summaries, instead of the configured one."),
+    str | None,
+    typer.Option(
+        "--language",
+        help="Of report.html and summaries, instead of the configured one.",
+        parser=_language,
+        metavar=" | ".join(LANGUAGES),
+    ),
 ]
 
 Strict = Annotated[

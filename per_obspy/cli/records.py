@@ -92,7 +92,7 @@ def fetch(
         bool, typer.Option("--shakemap", help="Fetch the ShakeMap of an earthquake too.")
     ] = False,
     map_version: Annotated[
-        str | None, typer.Option(help="Version of the ShakeMap; the preferred one if not given.")
+        int | None, typer.Option(help="Version of the ShakeMap; the preferred one if not given.")
     ] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Ask again for stations that had no data.")
@@ -104,22 +104,24 @@ def fetch(
 
     Example: per-obspy fetch us7000abcd -o records
     """
-    from per_obspy.runs.fetch import fetch_configured, fetch_event, fetch_map
+    from per_obspy.runs.fetch import fetch_configured, fetch_event
 
     # Options that are given count for an earthquake; a configuration has its own
-    named = {"providers": provider, "event_provider": event_service, "seedlink": seedlink}
+    named: dict[str, object] = {"providers": provider, "event_provider": event_service}
+    named |= {"seedlink": seedlink, "shakemap_version": map_version}
+    named["shakemap"] = shakemap or map_version is not None
     settings = {name: value for name, value in named.items() if value}
     with shown_progress() as progress:
         if Path(source).suffix == ".toml" or Path(source).is_file():
-            _require_no_options(source, settings, folder or shakemap or map_version)
+            _require_no_options(source, settings, folder)
             place, stations, rejected = fetch_configured(Path(source), again, progress)
         else:
+            # The folder has the name of the earthquake if it is not given one
             target = folder or Path(source.replace(":", "-").replace("/", "-"))
-            # In the first minutes there is a map, and no record yet
-            if shakemap or map_version:
-                _print_map(source, fetch_map(source, target, event_service, map_version))
             found = fetch_event(source, target, settings | {"radius": radius}, again, progress)
             place, stations, rejected = found.folder, found.stations, found.rejected
+            if found.shakemap:
+                _print_map(found.shakemap)
     _print_fetched(place, stations, rejected, as_json)
     stop_if_nothing(len(stations))
 
@@ -136,11 +138,8 @@ def _print_fetched(
     print_rejected(rows, len(rows))
 
 
-def _print_map(source: str, found: "ShakeMapFiles | None") -> None:
+def _print_map(found: "ShakeMapFiles") -> None:
     """Say on standard error which map there is, and how a run takes it."""
-    if found is None:
-        print(f"{source} has no ShakeMap yet: ask again later", file=sys.stderr)
-        return
     names = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
     options = " ".join(f"--set records.{name}={path}" for name, path in names.items() if path)
     print(f"ShakeMap, version {found.version}: per-obspy run ... {options}", file=sys.stderr)

@@ -19,7 +19,7 @@ from per_obspy.cli.printing import (
     shown_progress,
 )
 from per_obspy.errors import PerError, TryLater, printable
-from per_obspy.watch.logs import LogOptions, log_progress, logging_to
+from per_obspy.watch.logs import log_progress, logging_to
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,13 +59,13 @@ def logged(
     """
     has_bars = sys.stderr.isatty() and not quiet
     if not has_bars:
-        with logging_to(LogOptions(file, form is LogFormat.json, quiet, timed)):
+        with logging_to(file, form is LogFormat.json, quiet, timed):
             yield log_progress
         return
     # Bars take the place of lines on a terminal; the file has both
     with (
         shown_progress() as bars,
-        logging_to(LogOptions(file, form is LogFormat.json, quiet=True)),
+        logging_to(file, form is LogFormat.json, quiet=True),
     ):
 
         def move(stage: str, done: int, total: int) -> None:

@@ -153,6 +153,16 @@ class Fdsn(Window):
     event_provider: Provider = Field(
         "USGS", description="event service: a name known to ObsPy, or a base URL"
     )
+    shakemap: bool = Field(
+        False,
+        description=(
+            "whether the ShakeMap of the earthquake is fetched too, from the event service of the "
+            "USGS; a file in records.shakemap takes its place"
+        ),
+    )
+    shakemap_version: int | None = Field(
+        None, ge=1, description="version of the ShakeMap; if not set, the preferred one"
+    )
     latitude: float | None = Field(
         None,
         ge=-90,

@@ -65,6 +65,18 @@ class Run(Section):
             raise ValueError("give either simulation or records")
         if self.records is not None and self.pairs is None:
             raise ValueError("give pairs: a file, or how to simulate them")
+        fdsn = self.records.fdsn if self.records else None
+        if fdsn and fdsn.shakemap and not fdsn.event_id and self.watch is None:
+            raise ValueError("records.fdsn.shakemap needs records.fdsn.event_id")
+        return self
+
+    @model_validator(mode="after")
+    def _known_classes(self) -> Self:
+        for number, group in enumerate(self.notify.groups):
+            if group.least_class not in self.screening.classes:
+                classes = ", ".join(self.screening.classes)
+                key = f"notify.groups.{number}.least_class"
+                raise ValueError(f"{key}: {group.least_class!r} is none of {classes}")
         return self
 
     @model_validator(mode="after")

@@ -8,7 +8,8 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.section import Section
+from per_obspy.config.section import Language, Section
+from per_obspy.constants import LANGUAGES
 
 #: Any kind of settings.
 SectionType = TypeVar("SectionType", bound=Section)
@@ -303,9 +304,7 @@ class Screening(Section):
 class ReportTexts(Section):
     """The page ``report.html`` and the summaries."""
 
-    language: Literal["en", "es"] = Field(
-        "en", description="of page and summaries: en (English) or es (Spanish)"
-    )
+    language: Language = Field("en", description=f"of page and summaries: {' or '.join(LANGUAGES)}")
     revision: int = Field(
         0,
         ge=0,

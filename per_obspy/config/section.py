@@ -20,6 +20,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from per_obspy.constants import LANGUAGES
 from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.files import looks_like
 
@@ -47,6 +48,14 @@ def _moment(text: str) -> str:
     return text
 
 
+def _language(name: str) -> str:
+    """Return a language that has a catalogue of texts."""
+    if name not in LANGUAGES:
+        raise ValueError(f"{name!r} is no language of the page: {', '.join(LANGUAGES)}")
+    return name
+
+
+Language = Annotated[str, AfterValidator(_language)]
 Moment = Annotated[str, AfterValidator(_moment)]
 RelativePath = Annotated[
     Path, BeforeValidator(_named), AfterValidator(_from_folder), PlainSerializer(_to_folder)

@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from per_obspy.config.records import Provider
-from per_obspy.config.section import RelativePath, Section
+from per_obspy.config.section import Language, RelativePath, Section
+from per_obspy.constants import LANGUAGES
 
 
 class Reach(Section):
@@ -152,7 +153,63 @@ def _without_secret(argument: str) -> str:
 Argument = Annotated[str, AfterValidator(_without_secret)]
 
 
-class Notify(Section):
+class AppriseUrls(Section):
+    """Where the addresses of Apprise are, which hold secrets."""
+
+    apprise_urls_variable: str | None = Field(
+        None,
+        pattern="^[A-Za-z_][A-Za-z0-9_]*$",
+        description=(
+            "name of the environment variable with Apprise URLs, separated by blanks; needs "
+            "per_obspy[notify]"
+        ),
+    )
+    apprise_urls_file: RelativePath | None = Field(
+        None,
+        description=(
+            "file with one Apprise URL per line, which only its owner may read (chmod 600); needs "
+            "per_obspy[notify]"
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _one_list_of_urls(self) -> Self:
+        if self.apprise_urls_variable and self.apprise_urls_file:
+            raise ValueError("give either apprise_urls_variable or apprise_urls_file")
+        return self
+
+
+class Group(AppriseUrls):
+    """People who get messages about the pairs of their area, and only about bad ones."""
+
+    name: str = Field(min_length=1, max_length=80, description="name in messages, unique")
+    address: str = Field(
+        "", description="address that notify.command gets as PER_OBSPY_ADDRESS; or use Apprise URLs"
+    )
+    area: RelativePath | None = Field(
+        None,
+        description=(
+            "file of polygons (GeoJSON or WKT; longitude and latitude, degrees) that contain the "
+            "middle of a pair; needs per_obspy[gis]"
+        ),
+    )
+    where: dict[str, str] = Field(
+        default_factory=dict, description="column of the risk table = its value"
+    )
+    least_class: str = Field(description="least risk class that counts, of screening.classes")
+    least_count: int = Field(
+        1, ge=1, description="number of pairs of this class or worse from which there is a message"
+    )
+    language: Language = Field("en", description=f"of the messages: {' or '.join(LANGUAGES)}")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if bool(self.address) == bool(self.apprise_urls_variable or self.apprise_urls_file):
+            raise ValueError("give either address, or Apprise URLs by a variable or file")
+        return self
+
+
+class Notify(AppriseUrls):
     """Messages about first results, changed class counts and failures (docs/operation.md)."""
 
     on: tuple[Kind, ...] = Field(
@@ -170,20 +227,8 @@ class Notify(Section):
             "PER_OBSPY_REPORT are in its environment"
         ),
     )
-    apprise_urls_variable: str | None = Field(
-        None,
-        pattern="^[A-Za-z_][A-Za-z0-9_]*$",
-        description=(
-            "name of the environment variable with Apprise URLs, separated by blanks; needs "
-            "per_obspy[notify]"
-        ),
-    )
-    apprise_urls_file: RelativePath | None = Field(
-        None,
-        description=(
-            "file with one Apprise URL per line, which only its owner may read (chmod 600); needs "
-            "per_obspy[notify]"
-        ),
+    groups: tuple[Group, ...] = Field(
+        (), description="people of an area, each with a threshold, a language and an address"
     )
     timeout: float = Field(
         30.0, gt=0, le=600, description="longest time of a command or delivery, s"
@@ -192,13 +237,20 @@ class Notify(Section):
     @property
     def is_silent(self) -> bool:
         """Whether no way to notify is configured."""
-        ways = (self.command, self.apprise_urls_variable, self.apprise_urls_file)
+        ways = (self.command, self.apprise_urls_variable, self.apprise_urls_file, self.groups)
         return not self.on or not any(ways)
 
     @model_validator(mode="after")
-    def _one_list_of_urls(self) -> Self:
-        if self.apprise_urls_variable and self.apprise_urls_file:
-            raise ValueError("give either apprise_urls_variable or apprise_urls_file")
+    def _usable_ways(self) -> Self:
+        names = [group.name for group in self.groups]
+        # What groups were told last is known by their names
+        for group in self.groups:
+            if names.count(group.name) > 1:
+                raise ValueError(f"groups: the name {group.name!r} occurs twice")
+            if group.address and not self.command:
+                raise ValueError(
+                    f"groups: {group.name!r} has an address: give command, which uses it"
+                )
         if self.command and not self.command[0].strip():
             raise ValueError("command: its first word, the program, is empty")
         return self

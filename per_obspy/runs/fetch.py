@@ -8,10 +8,9 @@ from per_obspy.config import Fdsn, Records, Run, checked, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
-from per_obspy.records.earthquakes.services import OTHERS, PATIENCE, RECORDS_OF, event_of
-from per_obspy.records.earthquakes.shakemap_product import ShakeMapFiles, fetch_shakemap
+from per_obspy.records.earthquakes.services import OTHERS, RECORDS_OF, event_of
+from per_obspy.records.earthquakes.shakemap_product import ShakeMapFiles
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
-from per_obspy.records.fdsn.web import WebPool
 
 #: Radius around the epicentre in which stations of a named earthquake are wanted, m.
 RADIUS = 100_000.0
@@ -77,6 +76,8 @@ class FetchedEvent(NamedTuple):
     rejected: tuple[Rejection, ...]
     #: Section ``[records]`` of a configuration that reads all of this without the network.
     records: Records
+    #: ShakeMap, if it was asked for and there is one.
+    shakemap: ShakeMapFiles | None
 
 
 def fetch_event(
@@ -99,7 +100,7 @@ def fetch_event(
     settings : mapping, optional
         Keys of the section ``[records.fdsn]`` with other values than the defaults:
         ``event_provider``, ``radius`` (m, 100 000), ``channels``, ``providers``, ``before``,
-        ``after`` and so on.
+        ``after``, ``shakemap`` and so on.
     again : bool
         Whether to ask again for stations of which every service had no data.
     progress : callable
@@ -110,7 +111,7 @@ def fetch_event(
     CatalogError
         If the identifier or a setting is wrong, or the service has no such event.
     ServiceError
-        If services fail and there is no station at all.
+        If services fail and there is neither a station nor a ShakeMap.
     """
     given = dict(settings or {})
     # An event service that is named takes any identifier
@@ -136,37 +137,5 @@ def fetch_event(
         list(found.stations),
         found.rejected,
         Records(fdsn=request),
+        fetched.shakemap,
     )
-
-
-def fetch_map(
-    identifier: str, folder: Path, service: str | None = None, version: str | None = None
-) -> ShakeMapFiles | None:
-    """
-    Fetch the ShakeMap of an earthquake.
-
-    Parameters
-    ----------
-    identifier : str
-        As :func:`fetch_event` takes it.
-    folder : Path
-        Gets ``shakemap-VERSION``.
-    service : str, optional
-        Event service instead of the identifier's own.
-    version : str, optional
-        Number of a version; the preferred one if not given.
-
-    Returns
-    -------
-    ShakeMapFiles or None
-        None where there is no map yet, or the service lists none.
-
-    Raises
-    ------
-    CatalogError
-        If the identifier is wrong, or the version does not exist.
-    ServiceError
-        If the service fails.
-    """
-    provider, event_id = (service, identifier) if service else event_of(identifier)
-    return fetch_shakemap(WebPool(*PATIENCE), provider, event_id, folder, version)

@@ -92,6 +92,20 @@ class RunSettings:
         self.folder = Path(output or self.settings.output).resolve()
         self.base = self.file.parent if self.file else self.folder
 
+    def use_fetched_map(self) -> None:
+        """Let all stages read the ShakeMap that the cache of the records has, if there is one."""
+        records = self.settings.records
+        fdsn = records.fdsn if records else None
+        if records is None or fdsn is None or not fdsn.shakemap or records.shakemap:
+            return
+        from per_obspy.records.fdsn.cache import known_shakemap
+
+        # The configuration stays as it was given: a later run may have another version
+        if found := known_shakemap(fdsn):
+            files = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
+            update = {"records": records.model_copy(update=files)}
+            self.settings = self.settings.model_copy(update=update)
+
     def context(self, executor: Executor | None, progress: Progress) -> RunContext:
         """Return what the stages of the run share."""
         workers = Workers(self.settings.workers, executor, progress)

@@ -5,6 +5,7 @@ Whether the work is done is found out here with few libraries, so that a finishe
 once; :mod:`per_obspy.runs.stages` does what is left, in the order of its functions.
 """
 
+import logging
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
@@ -28,6 +29,8 @@ from per_obspy.runs.tasks.parallel import Workers, prepare_workers
 
 if TYPE_CHECKING:
     from per_obspy.records.fdsn.cache import Fetched
+
+log = logging.getLogger(__name__)
 
 
 def run(
@@ -74,10 +77,11 @@ def run(
         If the machine failed at some stations or chunks of pairs, after all others of this stage.
     """
     asked = RunSettings(configuration, output)
-    settings, folder = asked.settings, asked.folder
+    folder = asked.folder
     with locked_folder(folder):
         asked.write()
-        fetched = fetched or _fetched_records(settings, progress)
+        fetched = fetched or _fetched_records(asked.settings, progress)
+        asked.use_fetched_map()
         # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():
@@ -85,7 +89,7 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
-        _prepare_workers(settings, executor)
+        _prepare_workers(asked.settings, executor)
         from per_obspy.runs.stages import new_run
 
         return new_run(asked, asked.context(executor, progress), fetched, head, facts or {})
@@ -107,6 +111,7 @@ def screen(
     with locked_folder(asked.folder):
         # Stations and their facts are those of the latest run
         _require_stations(asked.folder)
+        asked.use_fetched_map()
         _prepare_workers(asked.settings, executor)
         from per_obspy.runs.stages import new_screening
 
@@ -127,6 +132,7 @@ def report(
     asked = RunSettings(configuration, output)
     with locked_folder(asked.folder):
         record = _finished(asked.folder / RECORD)
+        asked.use_fetched_map()
         from per_obspy.runs.stages import new_report
 
         return new_report(asked.context(None, progress), record)
@@ -144,7 +150,11 @@ def _fetched_records(settings: Run, progress: Progress) -> "Fetched | None":
         return None
     from per_obspy.records.sources import fetched_records
 
-    return fetched_records(settings.records, progress)
+    fetched = fetched_records(settings.records, progress)
+    for row in fetched.rejected if fetched else ():
+        if row.kind == "service":
+            log.warning("%s: %s", row.name, "; ".join(row.reasons))
+    return fetched
 
 
 def _require_stations(folder: Path) -> None:

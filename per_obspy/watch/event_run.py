@@ -132,11 +132,12 @@ def _pauses(folder: Path, now: datetime) -> Iterator[dict[str, float]]:
 
 
 def records_hash(fetched: Fetched | None) -> str:
-    """Return a hash of the names and contents of all fetched records; empty without services."""
+    """Return a hash of all fetched records and the ShakeMap; empty without services."""
     if fetched is None:
         return ""
     hashes = cached_hashes(fetched.folder)
-    return content_hash({name: known for name, known in hashes.items() if name.endswith(RECORDS)})
+    records = {name: known for name, known in hashes.items() if name.endswith(RECORDS)}
+    return content_hash(records | dict(fetched.shakemap.hashes if fetched.shakemap else {}))
 
 
 def has_missing(fetched: Fetched | None) -> bool:
@@ -262,7 +263,8 @@ def _run_with_records(
         done={**state.done, **{f"{delay:g}": started for delay in passed}},
         arrivals=arrivals,
         fetched=records_hash(fetched),
-        missing=has_missing(fetched),
+        # A ShakeMap is revised for days
+        missing=has_missing(fetched) or _follows_map(settings),
     )
     if not _has_records(settings, fetched):
         return Done(state, "no records yet")
@@ -273,6 +275,12 @@ def _run_with_records(
     return _published(folder, state, result, task, started)
 
 
+def _follows_map(settings: Run) -> bool:
+    """Return whether the ShakeMap of the earthquake is fetched."""
+    fdsn = settings.records.fdsn if settings.records else None
+    return fdsn is not None and fdsn.shakemap
+
+
 def _has_records(settings: Run, fetched: Fetched | None) -> bool:
     """Return whether records or a ShakeMap are available for a run."""
     records = settings.records
@@ -280,7 +288,9 @@ def _has_records(settings: Run, fetched: Fetched | None) -> bool:
     others = (records.folder, records.columns, records.sds, records.asdf, records.shakemap)
     if any(map(bool, others)):
         return True
-    return fetched is not None and bool(fetched_stations(fetched).stations)
+    if fetched is None:
+        return False
+    return fetched.shakemap is not None or bool(fetched_stations(fetched).stations)
 
 
 def arrivals_of(settings: Run) -> str:

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from per_obspy.config import Run, Watch, Window, checked
+from per_obspy.config import Fdsn, Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress
@@ -26,7 +26,7 @@ SETTLE = 10.0
 
 #: Keys of one earthquake, which a watcher sets itself.
 OF_ONE_EVENT = ("event", "time")
-OF_ONE_WINDOW = ("event_id", "start", "end", "latitude", "longitude")
+OF_ONE_WINDOW = ("event_id", "shakemap_version", "start", "end", "latitude", "longitude")
 
 
 class Watcher(NamedTuple):
@@ -88,13 +88,19 @@ def read_settings(file: Path) -> Run:
         placed["settle"] = records.get("settle", SETTLE)
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
-    # An unknown service is a mistake at the start, not a failure of every poll
-    fdsn = settings.records.fdsn if settings.records else None
-    named = [settings.watch.service, *(fdsn.providers if fdsn else ())]
-    for provider in named:
+    _require_services(file, settings.watch, settings.records.fdsn if settings.records else None)
+    return settings
+
+
+def _require_services(file: Path, watch: Watch, fdsn: Fdsn | None) -> None:
+    """Raise ``CatalogError`` if a service is unknown, or none lists ShakeMaps that are wanted."""
+    if fdsn and fdsn.shakemap and not watch.service:
+        problem = "records.fdsn.shakemap needs watch.service: a file names no ShakeMap"
+        raise CatalogError(str(file), problem)
+    # A mistake at the start, not a failure of every poll
+    for provider in (watch.service, *(fdsn.providers if fdsn else ())):
         if provider is not None and provider not in ROUTERS:
             base_url(provider)
-    return settings
 
 
 def _refuse_one_event(file: Path, records: dict[str, Any]) -> None:
@@ -137,10 +143,12 @@ def settings_of_event(settings: Run, folder: Path, state: EventState, delay: flo
     origin -= timedelta(seconds=origin.timestamp() % STEP)
     changes: dict[str, object] = {"event": folder / "event.xml"}
     # Downloads stay with the earthquake, and what fails is left for the next run
-    if records.fdsn is not None:
-        fdsn, window = records.fdsn, _window(records.fdsn, origin, ends)
-        patience = {"cache": folder / "records", "retries": min(fdsn.retries, RETRIES)}
-        changes["fdsn"] = fdsn.model_copy(update={**patience, **window})
+    if fdsn := records.fdsn:
+        update = {"cache": folder / "records", "retries": min(fdsn.retries, RETRIES)}
+        # The service that lists the earthquake has its map
+        if fdsn.shakemap:
+            update |= {"event_id": state.event_id, "event_provider": settings.watch.service}
+        changes["fdsn"] = fdsn.model_copy(update=update | _window(fdsn, origin, ends))
     if records.sds is not None:
         changes["sds"] = records.sds.model_copy(update=_window(records.sds, origin, ends))
     update = {

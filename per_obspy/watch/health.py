@@ -149,17 +149,13 @@ def folder_health(folder: Path, late: float = LATE, now: datetime | None = None)
         health = _watcher(read_status(folder), late, now or datetime.now(UTC))
         # The newest results of every earthquake, the latest first
         newest = folder.glob("events/*/latest/revision.json")
-        return _with_comparison(health, sorted(newest, key=_time_of, reverse=True))
+        latest_first = sorted(newest, key=lambda file: file.stat().st_mtime, reverse=True)
+        return _with_comparison(health, latest_first)
     if (folder / RECORD).exists():
         return _run(folder / RECORD)
     raise CatalogError(
         str(folder), f"holds neither {STATUS} of a watcher nor {RECORD} of a run: name its folder"
     )
-
-
-def _time_of(file: Path) -> float:
-    """Return the time at which a file was written, s."""
-    return file.stat().st_mtime
 
 
 def _with_comparison(health: Health, files: Sequence[Path]) -> Health:

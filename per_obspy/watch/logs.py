@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from typing_extensions import override
 
@@ -29,11 +29,14 @@ _USER = re.compile(r"(?<=://)\S*@")
 _SECRET = re.compile(r"(?i)\b(token|password|passwd|secret|api_?key)(=|: ?)[^\s&;,]+")
 
 
-class LogOptions(NamedTuple):
+@contextmanager
+def logging_to(
+    file: Path | None, as_json: bool = False, quiet: bool = False, timed: bool = False
+) -> Iterator[None]:
     """
-    Options of the log of a command.
+    Log the events of a block by the options of a command, with an error that ends it.
 
-    Attributes
+    Parameters
     ----------
     file : Path or None
         Text or JSON lines are appended to it; None: there is no file.
@@ -43,18 +46,6 @@ class LogOptions(NamedTuple):
         Whether standard error gets warnings and errors only.
     timed : bool
         Whether lines on standard error begin with their time.
-    """
-
-    file: Path | None = None
-    as_json: bool = False
-    quiet: bool = False
-    timed: bool = False
-
-
-@contextmanager
-def logging_to(options: LogOptions) -> Iterator[None]:
-    """
-    Log the events of a block by the options of a command, with an error that ends it.
 
     Raises
     ------
@@ -63,10 +54,11 @@ def logging_to(options: LogOptions) -> Iterator[None]:
     """
     # Standard error is for people, the file for machines
     console = logging.StreamHandler(sys.stderr)
-    console.setLevel(logging.WARNING if options.quiet else logging.INFO)
-    console.setFormatter(_TextLine() if options.timed else _ConsoleLine())
-    console.addFilter(_is_unprinted)
-    handlers = [console, *_file_handlers(options)]
+    console.setLevel(logging.WARNING if quiet else logging.INFO)
+    console.setFormatter(_TextLine() if timed else _ConsoleLine())
+    # Some events the command prints itself
+    console.addFilter(lambda record: not getattr(record, "printed", False))
+    handlers = [console, *_file_handlers(file, as_json)]
     # Handlers of other programs that use the package stay as they are
     level = ROOT.level
     ROOT.setLevel(logging.INFO)
@@ -88,20 +80,15 @@ def logging_to(options: LogOptions) -> Iterator[None]:
         ROOT.setLevel(level)
 
 
-def _file_handlers(options: LogOptions) -> list[logging.Handler]:
+def _file_handlers(file: Path | None, as_json: bool) -> list[logging.Handler]:
     """Return the handler of the log file, if there is one."""
-    if options.file is None:
+    if file is None:
         return []
-    with writing(options.file):
-        options.file.parent.mkdir(parents=True, exist_ok=True)
-        handler = _File(options.file, encoding="utf-8")
-    handler.setFormatter(_JsonLine() if options.as_json else _TextLine())
+    with writing(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        handler = _File(file, encoding="utf-8")
+    handler.setFormatter(_JsonLine() if as_json else _TextLine())
     return [handler]
-
-
-def _is_unprinted(record: logging.LogRecord) -> bool:
-    """Return whether the command leaves the printing of an event to the log."""
-    return not getattr(record, "printed", False)
 
 
 def _log_end(reason: str) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from signal import SIGKILL
 from typing import NamedTuple
 
-from per_obspy.config.watch import Kind, Notify
+from per_obspy.config.watch import AppriseUrls, Group, Kind, Notify
 from per_obspy.errors import MissingExtra, PerError, reason_of, require_extra, shortened
 
 log = logging.getLogger(__name__)
@@ -46,12 +46,15 @@ class Message(NamedTuple):
         Summary of the result, or the reason of the failure.
     report : Path or None
         Page with the result; None if there is none.
+    group : Group or None
+        Who gets it; None: everybody.
     """
 
     kind: Kind
     title: str
     text: str
     report: Path | None = None
+    group: Group | None = None
 
 
 def notify(settings: Notify, message: Message) -> tuple[str, ...]:
@@ -100,17 +103,21 @@ def _body(message: Message) -> str:
 
 def _by_command(settings: Notify, message: Message, body: str) -> None:
     """Start the configured command with the message, if there is one."""
-    if not settings.command:
+    group = message.group
+    if not settings.command or (group and not group.address):
         return
     known = {
         "PER_OBSPY_KIND": message.kind,
         "PER_OBSPY_TITLE": shortened(message.title, 200),
         "PER_OBSPY_REPORT": str(message.report or ""),
         "PER_OBSPY_FOLDER": str(message.report.parent if message.report else ""),
+        "PER_OBSPY_GROUP": group.name if group else "",
+        "PER_OBSPY_ADDRESS": group.address if group else "",
     }
     # Addresses of services are no business of the command
     inherited = dict(os.environ)
-    inherited.pop(settings.apprise_urls_variable or "", None)
+    for place in (settings, *settings.groups):
+        inherited.pop(place.apprise_urls_variable or "", None)
     code = _ended(settings.command, body, {**inherited, **known}, settings.timeout)
     if code:
         raise _Undelivered(f"{settings.command[0]} ended with exit code {code}")
@@ -118,7 +125,7 @@ def _by_command(settings: Notify, message: Message, body: str) -> None:
 
 def _by_apprise(settings: Notify, message: Message, body: str) -> None:
     """Deliver a message to the services of the configured URLs, if there are any."""
-    urls = _urls(settings)
+    urls = _urls(message.group or settings)
     if not urls:
         return
     try:
@@ -135,7 +142,7 @@ def _by_apprise(settings: Notify, message: Message, body: str) -> None:
         raise _Undelivered(f"{what} of its {len(urls)} services")
 
 
-def _urls(settings: Notify) -> list[str]:
+def _urls(settings: AppriseUrls) -> list[str]:
     """Return the configured Apprise URLs."""
     if settings.apprise_urls_variable:
         text = os.environ.get(settings.apprise_urls_variable, "")
@@ -150,7 +157,9 @@ def _urls(settings: Notify) -> list[str]:
 
 def _private_text(file: Path) -> str:
     """Return the content of a file that only its owner may read."""
-    with open(file, "rb", opener=_opened_at_once) as opened:
+    # A pipe without a writer does not block
+    flags = getattr(os, "O_NONBLOCK", 0)
+    with open(file, "rb", opener=lambda path, more: os.open(path, more | flags)) as opened:
         # The rights are those of the file that is read, whatever its name leads to later
         facts = os.fstat(opened.fileno())
         if not stat.S_ISREG(facts.st_mode):
@@ -160,11 +169,6 @@ def _private_text(file: Path) -> str:
             raise _Undelivered(f"{file}: mode {mode:o} lets others read it: chmod 600 {file}")
         content: bytes = opened.read(LARGEST_FILE)
     return content.decode("utf-8")
-
-
-def _opened_at_once(path: str, flags: int) -> int:
-    """Open a file; a pipe without a writer does not block."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _ended(

@@ -6,7 +6,7 @@ about, so that the same counts and the same failure are notified once.
 """
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ def notified_run(
     settings = configuration if isinstance(configuration, Run) else load(configuration, Run)
     if settings.notify.is_silent:
         return run(configuration, output, executor, progress)
+    check_groups(settings)
     # A folder that another run holds is left alone
     folder = Path(output or settings.output).resolve()
     try:
@@ -49,20 +50,28 @@ def notified_run(
     except PerError as error:
         notify_failure(settings.notify, folder, settings.name, str(error))
         raise
-    notify_result(settings.notify, result, settings.name)
+    notify_result(settings, result, settings.name)
     return result
 
 
+def check_groups(settings: Run) -> None:
+    """Raise ``CatalogError`` with the key of a group whose area cannot be read."""
+    if settings.notify.groups:
+        from per_obspy.watch.groups import check_areas
+
+        check_areas(settings)
+
+
 def notify_result(
-    settings: Notify, result: Result, name: str, shown: Path | None = None
+    settings: Run, result: Result, name: str, shown: Path | None = None
 ) -> tuple[str, ...]:
     """
-    Notify of the first result of a folder, or of one with changed class counts.
+    Notify everybody and each group of a first result, or of one with changed class counts.
 
     Parameters
     ----------
-    settings : Notify
-        Occasions and ways.
+    settings : Run
+        Occasions, ways and groups of its section ``[notify]``.
     result : Result
         Of a run.
     name : str
@@ -77,9 +86,18 @@ def notify_result(
     """
     folder, record = result.folder, result.record
     if record["state"] != "complete":
-        return notify_failure(settings, folder, name, "no pair or no station was usable")
-    # Counts that were notified before are no news
+        problem = "no pair or no station was usable"
+        return notify_failure(settings.notify, folder, name, problem)
     place = shown or folder
+    reasons = _notify_everybody(settings.notify, folder, name, place)
+    if settings.notify.groups:
+        reasons += _notify_groups(settings, folder, name, place, bool(record.get("simulated")))
+    return reasons
+
+
+def _notify_everybody(settings: Notify, folder: Path, name: str, place: Path) -> tuple[str, ...]:
+    """Notify of the class counts of a whole result, of which a folder is shown."""
+    # Counts that were notified before are no news
     counts = class_counts(place)
     earlier = read_json(folder / LATEST).get("classes")
     if earlier == counts:
@@ -88,11 +106,52 @@ def notify_result(
     known = earlier if isinstance(earlier, dict) else None
     change = "first result" if known is None else f"changed from {_words(known)}"
     title = f"{name}: {_words(counts)} ({change})"
-    page, summary = place / "report.html", place / "summary.txt"
-    text = _text(summary) or title
-    report = page if page.is_file() else summary
-    message = Message("first" if known is None else "changed", title, text, report)
+    text = _text(place / "summary.txt") or title
+    message = Message("first" if known is None else "changed", title, text, _report_of(place))
     return _sent(settings, folder, message, {"classes": counts})
+
+
+def _notify_groups(
+    settings: Run, folder: Path, name: str, place: Path, simulated: bool
+) -> tuple[str, ...]:
+    """Notify each group whose pairs have changed and reach its threshold, or no longer do."""
+    from per_obspy.watch.groups import counts_of, group_message
+
+    failed = list[str]()
+    for group in settings.notify.groups:
+        latest = read_json(folder / LATEST)
+        # A table without a column of one group holds up no other
+        try:
+            counts = counts_of(place, group, settings.screening.classes)
+        except PerError as error:
+            reason = shortened(f"notification of {group.name}: {error}", 300)
+            log.warning("%s", reason)
+            failed += _noted(folder, latest, [reason])
+            continue
+        # Each message is noted before the next one
+        told = _told_groups(latest)
+        earlier = told.get(group.name, {})
+        if message := group_message(group, name, counts, earlier, simulated):
+            message = message._replace(report=_report_of(place))
+            facts = {"classes": latest.get("classes"), "groups": {**told, group.name: counts}}
+            failed += _sent(settings.notify, folder, message, facts)
+    return tuple(failed)
+
+
+def _told_groups(latest: Mapping[str, Any]) -> dict[str, dict[str, int]]:
+    """Return the counts that each group was told last; damaged ones count as none."""
+    groups = latest.get("groups")
+    return {
+        name: counts
+        for name, counts in (groups if isinstance(groups, dict) else {}).items()
+        if isinstance(counts, dict) and all(isinstance(one, int) for one in counts.values())
+    }
+
+
+def _report_of(place: Path) -> Path:
+    """Return the page of a result, or its summary where there is no page."""
+    page = place / "report.html"
+    return page if page.is_file() else place / "summary.txt"
 
 
 def notify_failure(settings: Notify, folder: Path, name: str, reason: str) -> tuple[str, ...]:
@@ -129,13 +188,20 @@ def _sent(
 ) -> tuple[str, ...]:
     """Deliver a message, and write its subject and the failed ways of delivery."""
     reasons = notify(settings, message)
-    latest = {"kind": message.kind, "time": now(), "failed": list(reasons), **facts}
+    # What groups were told last stays
+    told = _told_groups(read_json(folder / LATEST))
+    latest = {"kind": message.kind, "time": now(), **({"groups": told} if told else {}), **facts}
+    return _noted(folder, latest, reasons)
+
+
+def _noted(folder: Path, latest: Mapping[str, object], reasons: Sequence[str]) -> tuple[str, ...]:
+    """Write the latest message with the ways that failed; return them with a failure to write."""
     try:
-        write_json(folder / LATEST, latest)
+        write_json(folder / LATEST, {**latest, "failed": list(reasons)})
     except WriteError as error:
         log.warning("%s", error)
         return (*reasons, str(error))
-    return reasons
+    return tuple(reasons)
 
 
 def undelivered(folders: Iterable[Path]) -> str | None:

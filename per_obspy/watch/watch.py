@@ -22,7 +22,12 @@ from per_obspy.runs.output_folder import RECORD, Result, locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
 from per_obspy.watch.event_settings import Watcher
 from per_obspy.watch.health import WatchStatus, write_status
-from per_obspy.watch.notified_run import notify_failure, notify_result, undelivered
+from per_obspy.watch.notified_run import (
+    check_groups,
+    notify_failure,
+    notify_result,
+    undelivered,
+)
 from per_obspy.watch.polling import confirm, is_over, keep, polled
 from per_obspy.watch.relevance import inventory_places
 from per_obspy.watch.revisions import WORK, point_latest, revision_folder
@@ -117,6 +122,7 @@ def watch_once(
         If the state cannot be written.
     """
     folder, used = settings.output.resolve(), clock or Clock()
+    check_groups(settings)
     with locked_folder(folder):
         places = inventory_places(settings, folder)
         watcher = Watcher(settings, folder, places, used.now, progress, executor)
@@ -135,6 +141,7 @@ def watch_forever(
     A pass that fails is tried again after a pause, which grows up to an hour.
     """
     used = clock or Clock()
+    check_groups(settings)
     folder, failures, end = settings.output.resolve(), 0, False
     with locked_folder(folder):
         places = inventory_places(settings, folder)
@@ -296,13 +303,13 @@ def deliver(watcher: Watcher, state: EventState) -> None:
 
 def _deliver(watcher: Watcher, state: EventState, folder: Path) -> None:
     """Deliver a message; one about counts or a failure that people know is not sent again."""
-    settings, label = watcher.settings.notify, f"{watcher.settings.name}: {state.event_id}"
+    settings, label = watcher.settings, f"{watcher.settings.name}: {state.event_id}"
     message, work = read_json(folder / OUTBOX), folder / WORK
     failure, number = message.get("failure"), message.get("revision")
     if not isinstance(number, int):
         return
     if failure is not None:
-        notify_failure(settings, work, label, str(failure))
+        notify_failure(settings.notify, work, label, str(failure))
         return
     # The folder of the runs works on: people are shown the revision, which never changes
     shown = revision_folder(folder, number) if number else None

@@ -5,13 +5,16 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from fdsn_server import FdsnServer, serving, status
 from test_shakemap import FIELDS, grid_xml, make_rows
 
 from per_obspy.config import Scenario
+from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.runs.run import run
+from per_obspy.simulation.buildings import simulated_pairs
 from per_obspy.simulation.earthquake import Simulation, simulate
 
 CONFIGURATION = """
@@ -114,9 +117,12 @@ def test_the_identifier_of_an_earthquake_is_enough_for_records(server, tmp_path,
     changes += [f"records.fdsn.event_provider='{server.url}'", "pairs.simulated.count=10"]
     changes += ["screening.largest_distance=1e5", "screening.exact=false", "spectra.count=5"]
     options = [word for change in changes for word in ("--set", change)]
+    add_map(server, "1")
     code, out, err = call("run", "USGS:xx1", *options, "-o", tmp_path / "out", "--json")
     assert code == 0, err
-    assert json.loads(out)["counts"]["stations"] == 2
+    record = json.loads(out)
+    assert record["counts"]["stations"] == 2
+    assert record["configuration"]["records"]["shakemap"] == "fetched/shakemap-1/grid.xml"
     assert "records: USGS:xx1 (identifier of an earthquake)" in err
     assert (tmp_path / "out" / "fetched").is_dir()
     # its configuration runs without the network
@@ -125,6 +131,51 @@ def test_the_identifier_of_an_earthquake_is_enough_for_records(server, tmp_path,
     code, out, _ = call("run", tmp_path / "out", "--json")
     assert (code, json.loads(out)["did_nothing"]) == (0, True)
     assert len(server.requests) == asked
+
+
+def add_map(server: FdsnServer, version: str, factor: float = 1.0) -> None:
+    """Add a ShakeMap around the stations: twice the factor, twice the acceleration."""
+    places = [(station.longitude, station.latitude) for station in server.inventory[0]]
+    east, north = zip(*places, strict=True)
+    box = [(min(one) - 1.0, (min(one) + max(one)) / 2, max(one) + 1.0) for one in (east, north)]
+    rows = [(*r[:5], *(factor * x for x in r[5:8]), r[8]) for r in make_rows(box[0], box[1][::-1])]
+    server.add_map(version, grid_xml=grid_xml(FIELDS, rows, (3, 3)).encode())
+
+
+def test_a_map_serves_until_records_come_and_each_version_is_named(server, tmp_path, call):
+    longitude, latitude = np.array([(one.longitude, one.latitude) for one in server.inventory[0]]).T
+    pairs = simulated_pairs(longitude, latitude, count=10, seed=1, radius=2000.0, touching=0.0)
+    write_pairs(pairs, tmp_path / "pairs.csv")
+    changes = [f"records.fdsn.providers=['{server.url}']", "records.fdsn.wait=0.01"]
+    changes += [f"records.fdsn.event_provider='{server.url}'", "records.fdsn.end='2100-01-01'"]
+    changes += ["screening.exact=false", "rows.enabled=false"]
+    options = [word for change in changes for word in ("--set", change)]
+    command = ("run", "USGS:xx1", tmp_path / "pairs.csv", *options, "-o", tmp_path / "out")
+    # The window of the records is not over, and there is no map: nothing to screen by, try later
+    code, _, err = call(*command)
+    assert (code, "still to come: fetch after it" in err) == (75, True)
+
+    def demands(*further: str) -> pd.Series:
+        code, _, err = call(*command, *further)
+        assert code == 0, err
+        assert "still to come" in err
+        risk = pd.read_parquet(tmp_path / "out" / "risk.parquet").set_index("pair_id")
+        assert set(risk["demand_rule"]) == {"shakemap"}
+        return risk["demand"].sort_index()
+
+    add_map(server, "1")
+    first = demands()
+    # A map that is there is asked for again on demand only, and the same version is not sent again
+    add_map(server, "2", factor=2.0)
+    fetch = ("fetch", "xx1", "--event-service", server.url, "--provider", server.url, "--again")
+    call(*fetch, "--shakemap", "-o", tmp_path / "out" / "fetched")
+    sent = server.asked("/archive/product/shakemap/xx1/1/grid.xml")
+    # Demand of a linear pair is proportional to the acceleration; rounding of its logarithm
+    np.testing.assert_allclose(demands(), 2.0 * first, rtol=1e-12)
+    assert server.asked("/archive/product/shakemap/xx1/1/grid.xml") == sent == 1
+    np.testing.assert_array_equal(demands("--set", "records.fdsn.shakemap_version=1"), first)
+    rejected = pd.read_csv(tmp_path / "out" / "rejected.csv")
+    assert "service" in set(rejected["kind"])
 
 
 def test_fetch_fills_the_cache_alone(server, configuration, call):
@@ -149,7 +200,7 @@ def test_fetch_takes_a_named_earthquake(server, tmp_path, call):
 
 def test_fetch_takes_the_shakemap_and_says_how_a_run_takes_it(server, tmp_path, call):
     options = ("--provider", server.url, "--event-service", server.url, "-o", tmp_path / "x")
-    assert "no ShakeMap yet" in call("fetch", "xx1", *options, "--shakemap")[2]
+    assert "no ShakeMap of xx1 yet" in call("fetch", "xx1", *options, "--shakemap")[2]
     server.add_map("1", grid_xml=grid_xml(FIELDS, make_rows(), (2, 3)).encode())
     code, _, err = call("fetch", "xx1", *options, "--shakemap")
     assert (code, "version 1: per-obspy run ... --set records.shakemap=" in err) == (0, True)

@@ -72,6 +72,7 @@ def test_defaults_in_comments_are_the_defaults():
     # Optional sections are left out, and one way of counting totals is enough
     blocks = re.split(r"\n(?=\[)", "\n".join(lines))
     optional = r"\[+(records\.(columns|fdsn|sds|asdf)|pairs\.(footprints|simulated)|watch)\b"
+    optional += r"|\[\[notify"
     kept = "\n".join(block for block in blocks if not re.match(optional, block))
     again = checked(Run, tomllib.loads(kept), folder=FOLDER)
     assert again == settings

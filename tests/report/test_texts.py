@@ -18,6 +18,7 @@ from per_obspy.results.coverage import _FAULTS, _KINDS, OTHERS
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.watch import groups
 
 ROOT = Path(per_obspy.__file__).parent
 ASSETS = files("per_obspy.report.page") / "assets"
@@ -39,6 +40,8 @@ def catalogue(language):
 @pytest.mark.parametrize("language", TRANSLATED)
 def test_every_text_is_translated_with_its_places_for_values(language):
     english, translated = catalogue("en"), catalogue(language)
+    messages = (groups.FIRST, groups.CHANGED, groups.BELOW, groups.PAIRS, groups.NOTE)
+    assert {("message", text) for text in messages} <= set(translated)
     # Names of flags and rules are English in the package
     names = {(None, key) for key in LANGUAGES["en"] if key.startswith(("flag", "rule_"))}
     keys = {key for key in translated if key[0] is None}
@@ -46,7 +49,8 @@ def test_every_text_is_translated_with_its_places_for_values(language):
     assert keys <= set(english) | names
     for key, forms in translated.items():
         assert all(forms), key
-        expected = english.get(key, [LANGUAGES["en"].get(key[1], "")])
+        # The key of a text of another module is its English
+        expected = english.get(key, [LANGUAGES["en"].get(key[1], key[1])])
         places = {frozenset(PLACES.findall(text)) for text in expected}
         assert {frozenset(PLACES.findall(text)) for text in forms} <= places, key
 

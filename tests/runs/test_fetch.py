@@ -5,9 +5,11 @@ import pytest
 from fdsn_server import serving, status
 from obspy import read
 from seedlink_server import seedlink
+from test_shakemap import FIELDS, grid_xml, make_rows
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
+from per_obspy.records.fdsn.cache import known_shakemap
 from per_obspy.records.sources import fetched_records, find_sources
 from per_obspy.runs.fetch import fetch_configured, fetch_event
 from per_obspy.simulation.earthquake import simulate
@@ -83,6 +85,21 @@ def test_a_named_earthquake_is_fetched_whole_and_once(server, tmp_path):
     assert list(sources.stations) == found.stations
     assert sources.event.path == found.event
     assert len(server.requests) == asked
+
+
+def test_a_map_outlives_a_service_that_fails_but_not_its_withdrawal(server, tmp_path):
+    settings = {"event_provider": server.url, "providers": [server.url], "retries": 0}
+    settings |= {"shakemap": True}
+    server.add_map("1", grid_xml=grid_xml(FIELDS, make_rows(), (2, 3)).encode())
+    assert fetch_event("xx1", tmp_path, settings).shakemap.version == "1"
+    server.fail("event", "*", status(503))
+    found = fetch_event("xx1", tmp_path, settings, again=True)
+    assert (found.shakemap.version, found.stations) == ("1", ["XX.S001", "XX.S002"])
+    assert ["HTTP 503" in row.reasons[0] for row in found.rejected] == [True]
+    server.maps.clear()
+    found = fetch_event("xx1", tmp_path, settings, again=True)
+    assert found.shakemap is known_shakemap(found.records.fdsn) is None
+    assert [row.reasons[0][:22] for row in found.rejected] == ["no ShakeMap of xx1 yet"]
 
 
 @pytest.mark.parametrize(

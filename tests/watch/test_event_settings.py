@@ -5,7 +5,7 @@ Tests ``per_obspy.config.watch`` as well.
 
 import pytest
 
-from per_obspy.config import Run
+from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
 from per_obspy.watch.event_settings import read_settings, settings_of_event
 from per_obspy.watch.state import EventState
@@ -60,6 +60,20 @@ def test_the_run_of_an_earthquake_knows_no_watcher(tmp_path):
     assert run.records.event == tmp_path / "x" / "event.xml"
 
 
+def test_a_map_is_of_the_earthquake_and_of_the_service_that_lists_it(tmp_path):
+    text = TEXT.replace("before = 20", "shakemap = true")
+    settings = read_settings(written(tmp_path, text))
+    fdsn = settings_of_event(settings, tmp_path, event("2026-11-23"), 900.0).records.fdsn
+    assert (fdsn.event_id, fdsn.event_provider) == ("x", "USGS")
+    # Files name no map, and a run without an identifier has none
+    with pytest.raises(CatalogError, match=r"shakemap needs watch\.service"):
+        read_settings(written(tmp_path, text.replace('service = "USGS"', 'folder = "x"')))
+    text = text.partition("[watch]")[0].replace("[pairs]", '[records]\nevent = "x"\n[pairs]')
+    text = text.replace("shakemap = true", 'shakemap = true\ncache = "c"')
+    with pytest.raises(CatalogError, match=r"shakemap needs records\.fdsn\.event_id"):
+        load(written(tmp_path, text), Run)
+
+
 def test_a_folder_of_records_waits_for_half_written_files(tmp_path):
     text = TEXT.replace('[records.fdsn]\nproviders = ["GEONET"]\nbefore = 20\nafter = 240', "")
     text = text.replace("[pairs]", '[records]\nfolder = "in"\n[pairs]')
@@ -80,6 +94,7 @@ def test_a_folder_of_records_waits_for_half_written_files(tmp_path):
         ('service = "USGS"', 'service = "USGS"\nregion = {latitude = 95, longitude = 0}', "95"),
         ("before = 20", 'event_id = "x"', "records.fdsn.event_id is of one earthquake"),
         ("before = 20", 'start = "2020-01-01"', "records.fdsn.start is of one earthquake"),
+        ("before = 20", "shakemap_version = 2", "shakemap_version is of one earthquake"),
         ('[records.fdsn]\nproviders = ["GEONET"]\n', "[fdsn]\n", r"no section \[records\]"),
     ],
 )

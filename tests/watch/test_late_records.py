@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 from fdsn_server import status
 from obspy import UTCDateTime
+from test_shakemap import FIELDS, grid_xml, make_rows
 from watched_city import ORIGIN
 
 from per_obspy.progress import silent
@@ -52,6 +53,31 @@ def test_a_late_station_is_asked_for_alone_and_makes_a_revision(city, server):
     # Everything is there: nothing is asked for any more
     city.at(10_000)
     assert subjects(server) == []
+
+
+def test_a_map_serves_before_the_records_and_each_version_makes_a_revision(city, server):
+    fdsn = city.settings.records.fdsn.model_copy(update={"shakemap": True})
+    records = city.settings.records.model_copy(update={"fdsn": fdsn})
+    city.settings = city.settings.model_copy(update={"records": records})
+    server.silent = {"S001", "S002"}
+    city.at(61)
+    # Neither a map nor a record
+    assert (city.revisions(), city.state().missing) == ([], True)
+    server.add_map("1", grid_xml=grid_xml(FIELDS, make_rows(), (2, 3)).encode())
+    city.at(185)
+    assert (city.event() / "records" / "shakemap-1" / "grid.xml").is_file()
+    assert city.revisions() == ["0001"]
+    first = city.state().fetched
+    server.silent = set()
+    city.at(310)
+    assert city.revisions() == ["0001", "0002"]
+    second = city.state().fetched
+    # All records are there, and the map is still asked for
+    server.add_map("2", grid_xml=grid_xml(FIELDS, make_rows(), (2, 3)).encode())
+    city.at(435)
+    third = city.state().fetched
+    assert len({first, second, third}) == 3
+    assert (city.event() / "records" / "shakemap-2" / "grid.xml").is_file()
 
 
 def test_a_record_that_was_cut_is_asked_for_again(city, server):

@@ -154,11 +154,12 @@ def quick_run(settings: Run, *others: object) -> Result:
     (folder / "stations").mkdir(parents=True, exist_ok=True)
     records = fetched_files(settings, others[4])
     magnitude = (settings.records.event or folder).read_text().partition("<mag>")[2][:60]
-    # One pair per station, of a state that follows from the earthquake
+    # One pair per station, or of a map alone, of a state that follows from the earthquake
     state = "yes" if "7" in magnitude else "no"
     names = [path.stem for path in records]
-    risk = {"rank": range(1, len(names) + 1), "pair_id": names}
-    risk |= {"state": [state] * len(names), "risk_class": ["low"] * len(names)}
+    pairs = names or ["map"]
+    risk = {"rank": range(1, len(pairs) + 1), "pair_id": pairs}
+    risk |= {"state": [state] * len(pairs), "risk_class": ["low"] * len(pairs)}
     pd.DataFrame(risk).to_parquet(folder / "risk.parquet")
     stations = pd.DataFrame({"station": names, "state": ["used"] * len(names)})
     stations.to_csv(folder / "stations.csv", index=False)

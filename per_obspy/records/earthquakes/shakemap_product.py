@@ -2,7 +2,8 @@
 ShakeMap of an earthquake: the files of one version, as the catalogue of the USGS lists them.
 
 The GeoJSON of an event (https://earthquake.usgs.gov/earthquakes/feed/v1.0/geojson_detail.php) names
-its products and their files. Other event services list no products.
+its products and their files. Other event services list no products. ``shakemap.json`` in a cache
+is the status file of the version that was fetched last.
 """
 
 import json
@@ -11,24 +12,56 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.files import written_whole
+from per_obspy.files import file_hash, written_whole
 from per_obspy.names import public_url
 from per_obspy.records.earthquakes.services import event_url
+from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, WebPool, answer, host
 from per_obspy.records.shakemap import read_shakemap
+from per_obspy.resume import (
+    Status,
+    StatusError,
+    changed_outputs,
+    earlier_status,
+    read_status,
+    write_status,
+)
 
 #: File of the product -> name here. Without the first there is no map.
 GRID, UNCERTAINTY, STATIONS = "grid.xml", "uncertainty.xml", "stationlist.json"
 _FILES = {f"download/{name}": name for name in (GRID, UNCERTAINTY, STATIONS)}
 
+#: Status file of the latest map of a cache.
+STATUS = "shakemap.json"
+
 
 class ShakeMapFiles(NamedTuple):
-    """Files of one version of a ShakeMap."""
+    """Files of one version of a ShakeMap, and the hash of each by its path in the cache."""
 
     version: str
     grid: Path
     uncertainty: Path | None
     stations: Path | None
+    hashes: Mapping[str, str]
+
+
+def cached_shakemap(
+    folder: Path, event_id: str, version: str | None = None
+) -> ShakeMapFiles | None:
+    """Return the map that `fetch_shakemap` fetched last, if these were its arguments."""
+    try:
+        status = read_status(folder / STATUS)
+    except StatusError:
+        return None
+    is_other = (status.get("event_id"), status.get("asked")) != (event_id, version)
+    return None if is_other or changed_outputs(folder / STATUS, status) else _files(folder, status)
+
+
+def _files(folder: Path, status: Status) -> ShakeMapFiles:
+    """Return the files that a status names."""
+    paths = {Path(name).name: folder / name for name in status["outputs"]}
+    optional = (paths.get(UNCERTAINTY), paths.get(STATIONS))
+    return ShakeMapFiles(str(status["version"]), paths[GRID], *optional, status["outputs"])
 
 
 def fetch_shakemap(
@@ -46,7 +79,7 @@ def fetch_shakemap(
     event_id : str
         As the service names it.
     folder : Path
-        Gets ``shakemap-VERSION`` with the files.
+        Gets ``shakemap-VERSION`` with the files; those that it has are not fetched again.
     version : str, optional
         Number of the wanted version; by default the preferred one.
 
@@ -67,17 +100,32 @@ def fetch_shakemap(
     if chosen is None:
         return None
     number = _version(chosen)
+    addresses = {name: _address(chosen, member) for member, name in _FILES.items()}
+    if not addresses[GRID]:
+        raise ServiceError(f"{public_url(url)}: version {number} of the ShakeMap has no {GRID}")
+    # The addresses of a file change with its content
+    key = digest((event_id, version, number, chosen["updateTime"], addresses))
+    if status := earlier_status(folder / STATUS, key):
+        return _files(folder, status)
     # Versions stand beside each other
     place = folder / f"shakemap-{number}"
+    files = _download(pool, url, addresses, place)
+    hashes = {f"{place.name}/{name}": file_hash(file) for name, file in files.items()}
+    facts = {"event_id": event_id, "asked": version, "version": number}
+    return _files(folder, write_status(folder / STATUS, key, hashes, facts))
+
+
+def _download(
+    pool: WebPool, url: str, addresses: Mapping[str, str], place: Path
+) -> dict[str, Path]:
+    """Fetch the files of a map into a folder; what is kept can be read."""
     place.mkdir(parents=True, exist_ok=True)
     files = {
         name: _fetched(pool, url, address, place / name)
-        for member, name in _FILES.items()
-        if (address := _address(chosen, member))
+        for name, address in addresses.items()
+        if address
     }
-    if GRID not in files:
-        raise ServiceError(f"{public_url(url)}: version {number} of the ShakeMap has no {GRID}")
-    # What is kept can be read; a damaged grid is asked for again
+    # A damaged grid is asked for again
     try:
         read_shakemap(files[GRID], files.get(UNCERTAINTY))
     except CatalogError as error:
@@ -85,7 +133,7 @@ def fetch_shakemap(
         raise ServiceError(
             f"{public_url(url)}: its ShakeMap is damaged: {error.problem}"
         ) from error
-    return ShakeMapFiles(number, files[GRID], files.get(UNCERTAINTY), files.get(STATIONS))
+    return files
 
 
 def _chosen(

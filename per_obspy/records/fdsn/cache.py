@@ -19,10 +19,17 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import Rejection, ServiceError, require_extra, shortened
-from per_obspy.files import is_part, remove_dead_parts
+from per_obspy.files import is_part, remove_dead_parts, remove_file
+from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
 from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
-from per_obspy.records.earthquakes.services import fetched_event
+from per_obspy.records.earthquakes.services import event_url, fetched_event
+from per_obspy.records.earthquakes.shakemap_product import (
+    STATUS,
+    ShakeMapFiles,
+    cached_shakemap,
+    fetch_shakemap,
+)
 from per_obspy.records.fdsn.download import (
     RECORDS,
     Outcome,
@@ -68,6 +75,8 @@ class Fetched(NamedTuple):
         Stations and services that failed, with every reason.
     is_complete : bool
         Whether every service and station answered, with records or that there are none.
+    shakemap : ShakeMapFiles or None
+        ShakeMap, if the request wants one and there is one.
     """
 
     folder: Path
@@ -75,6 +84,7 @@ class Fetched(NamedTuple):
     wanted: Wanted
     rejected: tuple[Rejection, ...]
     is_complete: bool = True
+    shakemap: ShakeMapFiles | None = None
 
 
 def fetch(
@@ -111,7 +121,8 @@ def fetch(
     MissingExtra
         If SeedLink servers are named and their client is not installed.
     ServiceError
-        If services fail and the cache has no station at all, or the window is not over yet.
+        If services fail and the cache has neither a station nor a ShakeMap, or the window is not
+        over yet and there is no ShakeMap.
     """
     pool = _pool(request, pauses)
     if event is None and request.event_id:
@@ -119,7 +130,62 @@ def fetch(
     file = read_event_file(event) if event else None
     wanted = wanted_around(request, file.event if file else None)
     fetched = Fetched(request.cache / folder_name(wanted), file, wanted, ())
+    # Minutes after an earthquake there may be a map, and no record yet
+    if request.shakemap and request.event_id:
+        fetched = _with_shakemap(pool, request, request.event_id, fetched, again)
+    records = _fetch_records(pool, request, fetched, progress, again, cut)
+    return records._replace(
+        rejected=(*fetched.rejected, *records.rejected),
+        is_complete=fetched.is_complete and records.is_complete,
+    )
 
+
+def _with_shakemap(
+    pool: WebPool, request: config.Fdsn, event_id: str, fetched: Fetched, again: bool
+) -> Fetched:
+    """Add the ShakeMap; one that is not there yet, or a service that fails, is a row."""
+    known, version = known_shakemap(request), _version(request)
+    if known and not again:
+        return fetched._replace(shakemap=known)
+    # An earlier map stays in use where the service fails
+    reason = f"no ShakeMap of {event_id} yet: the next run and `per-obspy watch` ask again"
+    try:
+        found = fetch_shakemap(pool, request.event_provider, event_id, request.cache, version)
+        is_complete = True
+    except ServiceError as error:
+        found, is_complete, reason = known, False, str(error)
+    if found and is_complete:
+        return fetched._replace(shakemap=found)
+    # A map that was withdrawn serves no run
+    if found is None:
+        remove_file(request.cache / STATUS)
+    url = public_url(event_url(request.event_provider))
+    rows = (Rejection("service", "ShakeMap", url, None, (reason,)),)
+    return fetched._replace(rejected=rows, is_complete=is_complete, shakemap=found)
+
+
+def known_shakemap(request: config.Fdsn) -> ShakeMapFiles | None:
+    """Return the ShakeMap of a request that is in its cache."""
+    if not (request.shakemap and request.event_id):
+        return None
+    return cached_shakemap(request.cache, request.event_id, _version(request))
+
+
+def _version(request: config.Fdsn) -> str | None:
+    """Return the wanted version of a ShakeMap, None for the preferred one."""
+    return None if request.shakemap_version is None else str(request.shakemap_version)
+
+
+def _fetch_records(
+    pool: WebPool,
+    request: config.Fdsn,
+    fetched: Fetched,
+    progress: Progress,
+    again: bool,
+    cut: bool,
+) -> Fetched:
+    """Return the content with the records, and only their rejections."""
+    wanted = fetched.wanted
     # A complete request is answered from the cache
     key = digest((wanted, request.providers, *request.seedlink))
     status = request.cache / f"complete-{key}.json"
@@ -127,11 +193,18 @@ def fetch(
     if rejected is not None:
         return fetched._replace(rejected=rejected)
     # Everything else needs the services
-    fetched = _ask_services(pool, request, fetched, progress, cut)
+    try:
+        fetched = _ask_services(pool, request, fetched, progress, cut)
+    except ServiceError as error:
+        if fetched.shakemap is None:
+            raise
+        providers = ", ".join(map(public_url, request.providers))
+        row = Rejection("service", FDSN, providers, None, (str(error),))
+        return fetched._replace(rejected=(row,), is_complete=False)
     if fetched.is_complete:
         facts = {"rejected": fetched.rejected}
         write_status(status, key, cached_hashes(fetched.folder), facts)
-    elif not fetched_stations(fetched).stations:
+    elif fetched.shakemap is None and not fetched_stations(fetched).stations:
         reasons = "; ".join(fetched.rejected[0].reasons)
         raise ServiceError(f"no station could be fetched; {reasons}")
     return fetched

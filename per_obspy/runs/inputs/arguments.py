@@ -232,6 +232,7 @@ def _fdsn_content(identifier: str, cache: Path) -> dict[str, Any]:
         "providers": list(RECORDS_OF.get(provider, OTHERS)),
         "channels": list(CHANNELS),
         "cache": str(cache),
+        "shakemap": provider == "USGS",
     }
 
 
