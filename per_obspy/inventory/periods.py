@@ -194,6 +194,7 @@ def period_correlation(
     is_unknown = (first == "other") | (second == "other")
     is_equal = np.equal(storeys_1, storeys_2)
     of_unknown = np.where(is_equal, ONE_SYSTEM_OF_EQUAL_STOREYS, ONE_SYSTEM_OF_OTHERS)
+    # the mean over both cases, of one system and of two
     chance = np.where(is_unknown, of_unknown, first == second)
     of_one_system = np.where(is_equal, ALIKE, ONE_SYSTEM)
     return np.asarray(OTHERS + chance * (of_one_system - OTHERS))

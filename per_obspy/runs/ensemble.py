@@ -143,8 +143,7 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
     names = ", ".join(("pair_id", "configuration", "probability", *SAME, *SEVERITY))
     rows += [
-        f"SELECT {number} AS scenario, {names}"
-        f" FROM table{number}"
+        f"SELECT {number} AS scenario, {names} FROM table{number}"
         for number, table in enumerate(tables)
         if table
     ]

@@ -101,7 +101,11 @@ SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
 
 #: Expected severity of a pair in a scenario, by which pairs are ordered, and its value where it is
 #: unknown: that without contact.
-SEVERITY = {"expected_impact_velocity": 0.0, "weighted_velocity": 0.0, "expected_amplification": 1.0}
+SEVERITY = {
+    "expected_impact_velocity": 0.0,
+    "weighted_velocity": 0.0,
+    "expected_amplification": 1.0,
+}
 
 #: Columns that do not depend on the scenarios; ``probability`` is the third.
 JOINED = (
@@ -190,12 +194,12 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
         beyond = np.nan_to_num(severity - unknown)
         columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
     # the hardest impact
-    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, severities[0])]
+    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
     return rows.assign(**columns)[names]
 
 
-def _worst(pounding: FloatArray, velocity: FloatArray) -> IndexArray:
+def _worst(pounding: FloatArray, velocity: FloatArray, *_: FloatArray) -> IndexArray:
     """Return the scenario of the hardest impact of each pair; of equal ones the likeliest."""
     order = np.lexsort((-pounding, -np.nan_to_num(velocity)), axis=0)
     return np.asarray(order[0])
