@@ -68,8 +68,7 @@ _ORDERED = f"""
         SELECT row_number() OVER () AS rank, *
         FROM (
             SELECT * FROM rows
-            ORDER BY expected_impact_velocity DESC, expected_amplification DESC, probability DESC,
-                pair_id
+            ORDER BY weighted_velocity DESC, expected_amplification DESC, probability DESC, pair_id
         )
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $statement}})
 """
@@ -126,10 +125,10 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
     zeros = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
-    rows = [f"SELECT -1 AS scenario, '' AS pair_id, {zeros} WHERE false"]
+    rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
+    names = ", ".join(("pair_id", "configuration", "probability", *SAME, *SEVERITY))
     rows += [
-        f"SELECT {number} AS scenario, pair_id, probability, {', '.join((*SAME, *SEVERITY))}"
-        f" FROM table{number}"
+        f"SELECT {number} AS scenario, {names} FROM table{number}"
         for number, table in enumerate(tables)
         if table
     ]
@@ -140,6 +139,7 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
         for name in ("probability", *SEVERITY)
     ]
     columns += [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
+    columns.append("max(configuration) AS configuration")
     return f"""
         COPY (
             SELECT pair_id, {", ".join(columns)} FROM ({" UNION ALL ".join(rows)})

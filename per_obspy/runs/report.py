@@ -341,7 +341,7 @@ def _region(
 def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFrame:
     """Return rows of an ensemble with the state and class of their probability and severity."""
     chance = piece["probability"].to_numpy(np.float64)
-    velocity = piece["expected_impact_velocity"].to_numpy(np.float64)
+    velocity = piece["weighted_velocity"].to_numpy(np.float64)
     return piece.assign(
         state=pounding_state(chance, limits.states),
         risk_class=risk_class(velocity, limits.classes),

@@ -26,7 +26,10 @@ OF_BUILDINGS = (
 )  # fmt: skip
 
 #: Flags that do not depend on the motion.
-OF_PAIRS = ("derived_inputs", "derived_period", "floor_to_column", "touching", *ROW_SUSPICIONS)
+OF_PAIRS = (
+    "derived_inputs", "derived_period", "equal_by_formula", "floor_to_column", "touching",
+    *ROW_SUSPICIONS,
+)  # fmt: skip
 
 
 class ScenarioRun(NamedTuple):

@@ -101,11 +101,15 @@ SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
 
 #: Expected severity of a pair in a scenario, by which pairs are ordered, and its value where it is
 #: unknown: that without contact.
-SEVERITY = {"expected_impact_velocity": 0.0, "expected_amplification": 1.0}
+SEVERITY = {
+    "expected_impact_velocity": 0.0,
+    "weighted_velocity": 0.0,
+    "expected_amplification": 1.0,
+}
 
 #: Columns that do not depend on the scenarios; ``probability`` is the third.
 JOINED = (
-    Column("rank", "int64", "", "1 is the worst: by expected impact velocity, then amplification"),
+    Column("rank", "int64", "", "1 is the worst: by weighted_velocity, then amplification"),
     Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
     Column(
         "annual_probability",
@@ -114,6 +118,13 @@ JOINED = (
         "of pounding within a year, scenarios coming as a Poisson process",
     ),
     Column("expected_impact_velocity", "float64", "m/s", "weighted mean of those in the scenarios"),
+    Column("configuration", "str", "", "that of the pair in the runs"),
+    Column(
+        "weighted_velocity",
+        "float64",
+        "m/s",
+        "weighted mean of those in the scenarios, which have the factor of the configuration",
+    ),
     Column(
         "expected_amplification",
         "float64",
@@ -155,9 +166,9 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     Parameters
     ----------
     joined : DataFrame
-        ``pair_id``; ``probability_<name>``, ``expected_impact_velocity_<name>`` (m/s) and
-        ``expected_amplification_<name>`` of each scenario; and the smallest and largest value in
-        any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
+        ``pair_id`` and ``configuration``; ``probability_<name>`` and the columns of ``SEVERITY`` of
+        each scenario, such as ``weighted_velocity_<name>`` (m/s); and the smallest and largest
+        value in any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
     weights : mapping of str to float
         Weight of each scenario; see :func:`conditional_probability`.
     yearly : bool
@@ -171,7 +182,7 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     """
     rows = joined[_comparable(joined, weights)].reset_index(drop=True)
     weight = np.array(list(weights.values()))
-    pounding, velocity, amplification = (
+    pounding, *severities = (
         rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64).T
         for name in ("probability", *SEVERITY)
     )
@@ -179,16 +190,16 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     columns: Columns = {"probability": conditional_probability(pounding, weight)}
     if yearly:
         columns["annual_probability"] = annual_probability(pounding, weight)
-    for severity, (name, unknown) in zip((velocity, amplification), SEVERITY.items(), strict=True):
+    for severity, (name, unknown) in zip(severities, SEVERITY.items(), strict=True):
         beyond = np.nan_to_num(severity - unknown)
         columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
     # the hardest impact
-    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, velocity)]
+    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
     return rows.assign(**columns)[names]
 
 
-def _worst(pounding: FloatArray, velocity: FloatArray) -> IndexArray:
+def _worst(pounding: FloatArray, velocity: FloatArray, *_: FloatArray) -> IndexArray:
     """Return the scenario of the hardest impact of each pair; of equal ones the likeliest."""
     order = np.lexsort((-pounding, -np.nan_to_num(velocity)), axis=0)
     return np.asarray(order[0])

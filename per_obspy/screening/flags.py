@@ -11,7 +11,15 @@ from per_obspy.inventory.schema import ROW_SUSPICIONS
 from per_obspy.inventory.suspicions import ODD
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.meanings import FLAGS, RECORD_FLAGS
-from per_obspy.screening.values import BoolArray, Table, TextArray, both, number, values
+from per_obspy.screening.values import (
+    BoolArray,
+    Table,
+    TextArray,
+    both,
+    number,
+    oscillators,
+    values,
+)
 from per_obspy.spectra.station import lacks_azimuths
 
 #: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it
@@ -65,6 +73,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         [isinstance(note, str) and note != "" for note in np.asarray(notes).tolist()], bool
     )
     odd = _named_in(table[ODD]) if ODD in table else {}
+    is_derived = period_is_derived(table)
     return {
         **odd,
         "unknown_gap": np.asarray(unknown, dtype=bool),
@@ -74,11 +83,18 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "beyond_elastic": np.fmax(*both(table, "elastic_ratio")) > 1.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
-        "derived_period": period_is_derived(table),
+        "derived_period": is_derived,
+        "equal_by_formula": is_derived & _are_equal(table),
         "no_demand": values(table, "demand") == 0.0,
         "soft_ground": np.asarray(table["soft_ground"], dtype=bool),
         "floor_to_column": np.asarray(table["floors_misaligned"], dtype=bool),
     }
+
+
+def _are_equal(table: Table) -> BoolArray:
+    """Return a mask of pairs of equal oscillators."""
+    period_1, damping_1, period_2, damping_2 = oscillators(table)
+    return np.asarray((period_1 == period_2) & (damping_1 == damping_2))
 
 
 def _named_in(odd: Iterable[str]) -> dict[str, BoolArray]:

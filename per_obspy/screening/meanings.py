@@ -69,6 +69,11 @@ FLAGS: dict[str, str] = {
     "derived_period": (
         "a period was derived: the demand is at least SRSS; state and rank follow from resampling"
     ),
+    "equal_by_formula": (
+        "both periods are derived and equal, by which the buildings would move as one and not hit: "
+        "state and rank follow from how much the periods of alike neighbours differ "
+        "(period_correlation)"
+    ),
     "soft_ground": (
         "the ground is soft: the soil lengthens periods, by which derived ones are less certain"
     ),

@@ -187,11 +187,14 @@ def likely_oscillators(table: Table) -> tuple[FloatArray, ...]:
     Return period, s, and damping of both buildings, their periods as far apart as is likely.
 
     Between uncertain periods the root mean square of ln(T2 / T1) of the population is taken: equal
-    medians do not make equal periods.
+    medians do not make equal periods, and alike neighbours miss a formula alike.
     """
     period_1, damping_1, period_2, damping_2 = oscillators(table)
-    spread = np.hypot(*both(table, "period_log_std"))
-    apart = np.hypot(np.log(period_2 / period_1), spread)
+    std_1, std_2 = both(table, "period_log_std")
+    shared = 2.0 * values(table, "period_correlation") * std_1 * std_2
+    # not below 0 by round-off
+    variance = np.maximum(std_1**2 + std_2**2 - shared, 0.0)
+    apart = np.sqrt(np.log(period_2 / period_1) ** 2 + variance)
     return period_1, damping_1, period_1 * np.exp(apart), damping_2
 
 

@@ -29,8 +29,11 @@ def tables():
         }
     )
     pairs = pairs.assign(
-        expected_impact_velocity=random.uniform(0, 1, COUNT), expected_amplification=1.2
+        expected_impact_velocity=random.uniform(0, 1, COUNT),
+        expected_amplification=1.2,
+        configuration="tall_beside_low",
     )
+    pairs["weighted_velocity"] = 1.5 * pairs["expected_impact_velocity"]
     # Each lacks a pair of the other
     near = pairs.assign(probability=random.uniform(0, 1, COUNT))
     far = pairs.assign(probability=random.uniform(0, 0.2, COUNT))
@@ -55,7 +58,8 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     assert counts == {"pairs": COUNT - 2, "rejected_pair": 2}
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     assert table["rank"].tolist() == list(range(1, COUNT - 1))
-    assert table["expected_impact_velocity"].is_monotonic_decreasing
+    assert table["weighted_velocity"].is_monotonic_decreasing
+    assert set(table["configuration"]) == {"tall_beside_low"}
     # joined by pandas instead: would catch rows joined by position, or scenarios that changed
     # places
     near, far = (
@@ -74,18 +78,18 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
 def test_ties_go_to_the_amplification_the_probability_and_then_to_the_name(tables, tmp_path):
     # would catch: likely pairs before hard ones
     for table in tables.values():
-        table["probability"], table["expected_impact_velocity"] = 0.5, 0.5
+        table["probability"], table["weighted_velocity"] = 0.5, 0.5
     near = tables["near"].set_index("pair_id", drop=False)
-    near.loc["p100", ["expected_impact_velocity", "probability"]] = [3.0, 0.1]
+    near.loc["p100", ["weighted_velocity", "probability"]] = [3.0, 0.1]
     near.loc["p200", "expected_amplification"] = 4.0
     near.loc["p300", "probability"] = 0.9
-    near.loc["p450", "expected_impact_velocity"] = np.nan
+    near.loc["p450", "weighted_velocity"] = np.nan
     _written({**tables, "near": near}, tmp_path)
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     assert table["pair_id"].tolist()[:5] == ["p100", "p200", "p300", "p000", "p001"]
     assert table["pair_id"].iloc[-1] == "p450"
     # two thirds of the weight are near's
-    assert_allclose(table["expected_impact_velocity"][0], (2 * 3.0 + 0.5) / 3)
+    assert_allclose(table["weighted_velocity"][0], (2 * 3.0 + 0.5) / 3)
     assert_allclose(table["expected_amplification"][1], (2 * 4.0 + 1.2) / 3)
 
 

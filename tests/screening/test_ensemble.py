@@ -58,8 +58,9 @@ def _joined(*rows):
     same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
     # the same severity in both
     for name in ("near", "far"):
-        severity = {f"expected_impact_velocity_{name}": 0.5}
+        severity = {f"expected_impact_velocity_{name}": 0.5, f"weighted_velocity_{name}": 1.0}
         table = table.assign(**severity, **{f"expected_amplification_{name}": np.nan})
+    table["configuration"] = "floor_to_column"
     return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
 
 
@@ -78,11 +79,16 @@ def test_every_pair_has_its_probabilities_and_its_worst_scenario():
 
 def test_the_expected_severity_is_the_weighted_mean_of_the_scenarios():
     joined = _joined(("a", 0.5, 0.0)).assign(
-        expected_impact_velocity_far=8.0, expected_amplification_near=1.6
+        expected_impact_velocity_far=8.0,
+        weighted_velocity_far=16.0,
+        expected_amplification_near=1.6,
     )
     table = ensemble_rows(joined, WEIGHTS, yearly=False)
     # three quarters of the weight; an unknown amplification is 1
     assert_allclose(table["expected_impact_velocity"], 0.75 * 0.5 + 0.25 * 8.0)
+    # the factor of the configuration is that of the scenarios
+    assert_allclose(table["weighted_velocity"], 2.0 * table["expected_impact_velocity"])
+    assert table["configuration"].tolist() == ["floor_to_column"]
     assert_allclose(table["expected_amplification"], 1.0 + 0.75 * 0.6)
 
 

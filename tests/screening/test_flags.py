@@ -26,6 +26,8 @@ PLAIN = {
     "distance": [1e3, 1e3],
     "period_1": [0.5, 0.5],
     "period_2": [2.0, 2.0],
+    "damping_1": [0.05, 0.05],
+    "damping_2": [0.05, 0.05],
     "per_1": [0.1, 0.1],
     "per_2": [0.2, 0.2],
     "sd_1": [0.1, 0.1],
@@ -76,6 +78,11 @@ def _raised(flags):
         ({"demand_ratio": np.nan, "demand": 0.0}, {"no_demand"}),
         ({"derived": "system_1"}, {"derived_inputs"}),
         ({"derived": "mass_2 period_2"}, {"derived_inputs", "derived_period"}),
+        # both periods equal and derived, which no record can tell apart
+        (
+            {"derived": "period_1 period_2", "period_2": 0.5},
+            {"derived_inputs", "derived_period", "equal_by_formula"},
+        ),
         ({"floors_misaligned": True}, {"floor_to_column"}),
         ({"soft_ground": True}, {"soft_ground"}),
         # either building counts, whether the strength of the other is known or not

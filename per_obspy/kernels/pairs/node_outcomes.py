@@ -18,10 +18,12 @@ from per_obspy.kernels.vector_functions import (
     normal_tails,
 )
 
-#: Loss of impact velocity by earlier impacts, per root of the correlation.
-LOSS = 1.1
-#: Share of the change of velocity that adds to the radius.
-RADIUS_SHARE = 0.7
+#: Loss of impact velocity by earlier impacts, per root of the correlation, and where the
+#: correlation is neither 0 nor 1, per their product.
+LOSS, LOSS_BETWEEN = 1.02, 0.53
+#: Share of the change of velocity that a strong impact adds to the radius, and growth of the radius
+#: per root of a weak change.
+RADIUS_SHARE, WEAK_SHARE = 0.76, 0.145
 #: Share of the population that the quantile of the impact velocity is not below.
 QUANTILE = 0.84
 #: Demand / largest demand of the pair's nodes below which its logarithm does not count in the
@@ -114,7 +116,10 @@ def _velocities(motion, work, integers):
         gap = work[1, node]
         share = gap / demand if demand > gap else 1.0
         work[2, node] = work[0, node] * motion[VELOCITY, node] * math.sqrt(1.0 - share * share)
-        work[3, node] = -LOSS * math.sqrt(max(motion[CORRELATION, node], 0.0)) * (1.0 - share)
+        # earlier impacts of nearly equal oscillators
+        alike = max(motion[CORRELATION, node], 0.0)
+        loss = LOSS * math.sqrt(alike) + LOSS_BETWEEN * alike * (1.0 - alike)
+        work[3, node] = -loss * (1.0 - share)
     exponentials(work[3], integers)
     for node in range(work.shape[1]):
         work[2, node] *= work[3, node]
@@ -123,13 +128,14 @@ def _velocities(motion, work, integers):
 @kernel
 def _amplification(motion, work, node, fact):
     """Return the larger ratio of both radii with and without impact, at least 1."""
-    velocity = RADIUS_SHARE * work[2, node] / work[0, node]
+    velocity = work[2, node] / work[0, node]
     speed_1, speed_2 = motion[SPEED_1, node], motion[SPEED_2, node]
     # Changes of velocity over the speeds of the oscillators
     change_1 = fact[RECEIVED_1] * velocity / speed_1 if speed_1 > 0.0 else 0.0
     change_2 = fact[RECEIVED_2] * velocity / speed_2 if speed_2 > 0.0 else 0.0
     largest = max(change_1, change_2)
-    return math.sqrt(1.0 + largest * largest)
+    strong = (RADIUS_SHARE * largest) ** 2
+    return math.sqrt(math.sqrt(1.0 + strong * strong)) + WEAK_SHARE * math.sqrt(largest)
 
 
 @kernel

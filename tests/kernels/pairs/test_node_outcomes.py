@@ -7,8 +7,10 @@ from scipy.special import ndtr
 
 from per_obspy.kernels.pairs.node_outcomes import (
     LOSS,
+    LOSS_BETWEEN,
     QUANTILE,
     RADIUS_SHARE,
+    WEAK_SHARE,
     fill_chances,
     fill_outcomes,
 )
@@ -49,19 +51,26 @@ def _chance(demands, gap, known):
     return np.where(moving, chance, demands > gap[:, None]).mean(axis=1)
 
 
+def _grown(change):
+    """Return the amplification by a change of velocity over the speed of an oscillator."""
+    return (1.0 + (RADIUS_SHARE * change) ** 4) ** 0.25 + WEAK_SHARE * np.sqrt(change)
+
+
 def _definition(motion, facts, deviates):
     demand, velocity, speed_1, speed_2, correlation = motion
     median_gap, gap_std, demand_std, factor, received_1, received_2, contact = facts[:, :, None]
     gap, scale = median_gap * np.exp(gap_std * deviates[1]), np.exp(demand_std * deviates[0])
     moving = scale * demand > gap
     share = np.divide(gap, scale * demand, out=np.ones(moving.shape), where=moving)
-    loss = np.exp(-LOSS * np.sqrt(np.maximum(correlation, 0.0)) * (1.0 - share))
+    alike = np.maximum(correlation, 0.0)
+    loss = LOSS * np.sqrt(alike) + LOSS_BETWEEN * alike * (1.0 - alike)
+    loss = np.exp(-loss * (1.0 - share))
     impact = factor * scale * velocity * np.sqrt(1.0 - share**2) * loss
     # a lognormal factor of mean 1, which the means do not need
     by_contact = impact * np.exp(contact * deviates[2] - contact**2 / 2.0)
     changes = [
         np.divide(
-            RADIUS_SHARE * received * impact / scale,
+            received * impact / scale,
             speed,
             out=0.0 * impact,
             where=speed > 0.0,
@@ -73,7 +82,7 @@ def _definition(motion, facts, deviates):
             _chance(demand, facts[0], np.hypot(facts[1], facts[2])),
             impact.mean(axis=1),
             np.quantile(by_contact, QUANTILE, axis=1),
-            np.sqrt(1.0 + np.maximum(*changes) ** 2).mean(axis=1),
+            _grown(np.maximum(*changes)).mean(axis=1),
         ]
     )
 
@@ -104,7 +113,7 @@ def test_both_buildings_are_symmetric_and_the_lighter_one_is_amplified():
     motion, turned = (0.2, 0.4, 0.6, 0.5, 0.0), (0.2, 0.4, 0.5, 0.6, 0.0)
     assert _amplification(motion, (1.2, 0.4)) == _amplification(turned, (0.4, 1.2)) > 1.0
     # equal changes: the slower building
-    expected = np.hypot(1.0, 0.7 * 1.2 * 0.4 / 0.5)
+    expected = _grown(1.2 * 0.4 / 0.5)
     assert_allclose(_amplification(motion, (1.2, 1.2)), expected, rtol=1e-12)
 
 
