@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
-from per_obspy.report.page.map_lines import lines_around
+from per_obspy.report.page.map_lines import beside, continuous, lines_around
 from per_obspy.report.results import Region
 from per_obspy.report.style import (
     FAINT_COLOUR,
@@ -73,21 +73,6 @@ def frame_of(longitude: ArrayLike, latitude: ArrayLike) -> Frame:
     """Return the smallest frame around some points (degrees), at least one."""
     east, north = np.asarray(longitude, dtype=np.float64), np.asarray(latitude, dtype=np.float64)
     return Frame(float(east.min()), float(east.max()), float(north.min()), float(north.max()))
-
-
-def continuous(longitude: ArrayLike) -> FloatArray:
-    """
-    Return longitudes (degrees) without a step at the date line.
-
-    Examples
-    --------
-    >>> print(continuous([179.5, -179.5]), continuous([-71.0, 10.0]))
-    [179.5 180.5] [-71.  10.]
-    """
-    given = np.asarray(longitude, dtype=np.float64)
-    if given.size == 0 or np.ptp(given) <= 180.0:
-        return given
-    return np.where(given < 0.0, given + 360.0, given)
 
 
 #: Worst places that have a map of their own, and the pairs that each of them has at least.
@@ -280,7 +265,7 @@ def _draw_stations(axes: Axes, region: Region, frame: Frame) -> None:
     places = region.stations[["longitude", "latitude"]].to_numpy(dtype=np.float64)
     for marker, size, marks in (("^", 30.0, places), ("*", 130.0, _epicentre(region))):
         # Only those within the map, which they would widen otherwise
-        east, north = _beside(marks[:, 0], 0.5 * (frame.west + frame.east)), marks[:, 1]
+        east, north = beside(marks[:, 0], 0.5 * (frame.west + frame.east)), marks[:, 1]
         inside = (east >= frame.west) & (east <= frame.east)
         inside &= (north >= frame.south) & (north <= frame.north)
         axes.scatter(east[inside], north[inside], marker=marker, s=size, **outline)
@@ -289,11 +274,6 @@ def _draw_stations(axes: Axes, region: Region, frame: Frame) -> None:
 def _epicentre(region: Region) -> FloatArray:
     """Return the place of the epicentre, (1, 2) or (0, 2), degrees."""
     return np.array([region.epicentre] if region.epicentre else []).reshape(-1, 2)
-
-
-def _beside(longitude: FloatArray, middle: float) -> FloatArray:
-    """Return longitudes within 180 degrees of the middle of a map."""
-    return np.asarray(middle + (longitude - middle + 180.0) % 360.0 - 180.0)
 
 
 def _mark(axes: Axes, frames: Sequence[Frame]) -> None:

@@ -124,7 +124,7 @@ def _report_pairs(
     write_overview(results, folder, report)
     _draw_worst_pair(differing_pair(results.worst), stations, folder, report)
     with report.tried(folder / "report.html"):
-        page = with_page_data(results, folder, outlines)
+        page = with_page_data(results, folder, outlines, settings.report, report)
         drawings = page_drawings(settings, results.worst, stations)
         table = station_rows(folder / "stations.csv", stations)
         write_page(replace(page, stations=table, drawings=drawings), folder / "report.html")

@@ -8,22 +8,29 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
 from per_obspy.checks import FloatArray
-from per_obspy.config import Totals
-from per_obspy.errors import CatalogError, PerError
+from per_obspy.config import ReportTexts, Totals
+from per_obspy.errors import CatalogError, PerError, printable
 from per_obspy.files import remove_file
 from per_obspy.report.layers.kml import ROWS as KML_ROWS
 from per_obspy.report.layers.kml import write_kml
 from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
+from per_obspy.report.page.background import read_background
 from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS
-from per_obspy.report.page.map_lines import lines_around, read_outlines
+from per_obspy.report.page.map_lines import (
+    continuous,
+    lines_around,
+    read_outlines,
+    towns_around,
+)
 from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.results import Results
 from per_obspy.report.statements import alert_line
@@ -62,6 +69,9 @@ LISTED_COLUMNS = (
     "distance", "flags", "derived", "missing_gap", "longitude", "latitude", "longitude_1",
     "latitude_1", "longitude_2", "latitude_2",
 )  # fmt: skip
+
+#: Towns of which the page chooses names for its map, as far as they have room.
+MOST_TOWNS = 200
 
 #: Column of the neighbours of a building that can hit it.
 HIT = "neighbours_that_can_hit"
@@ -379,26 +389,49 @@ def _sheets(results: Results, note: str) -> list[Sheet]:
     return [sheet for sheet in sheets if not sheet.table.empty]
 
 
-def with_page_data(results: Results, folder: Path, outlines: Path | None) -> Results:
-    """Return results with rejections, outlines and coast lines for the page."""
+def with_page_data(
+    results: Results, folder: Path, outlines: Path | None, settings: ReportTexts, report: Report
+) -> Results:
+    """Return results with rejections, outlines, and lines and towns of the map for the page."""
     rejected, rejections = _rejected(folder / "rejected.csv")
     worst, rings = results.worst, list[tuple[str, list[float]]]()
     # Outlines of the buildings of these pairs, if the pairs came with them
     if outlines is not None and "building_id_1" in worst:
         names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
         rings = read_outlines(outlines, names.unique().tolist())
-    return replace(
-        results,
-        rejected=rejected,
-        rejections=rejections,
-        outlines=rings,
-        lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
-    )
+    placed = replace(results, rejected=rejected, rejections=rejections, outlines=rings)
+    # Pairs that the page has one by one, and those that it counts
+    places = [worst, results.tally.cells.table()]
+    if not {"longitude", "latitude"} <= set(worst):
+        return placed
+    longitude, latitude = pd.concat(places)[["longitude", "latitude"]].dropna().to_numpy(float).T
+    return _with_map(placed, continuous(longitude), latitude, settings, report)
 
 
-def _column(table: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column of numbers, empty if the table lacks it."""
-    return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
+def _with_map(
+    results: Results,
+    longitude: FloatArray,
+    latitude: FloatArray,
+    settings: ReportTexts,
+    report: Report,
+) -> Results:
+    """Return results with coast lines, towns and background around places (degrees)."""
+    lines: dict[str, Sequence[Any]] = dict(lines_around(longitude, latitude))
+    lines["towns"] = towns_around(longitude, latitude, MOST_TOWNS)
+    if settings.background is None or not longitude.size:
+        return replace(results, lines=lines)
+    # A file that cannot be read leaves the page without its lines
+    try:
+        layers = settings.background_layers
+        lines["background"], credit = read_background(
+            settings.background, layers, longitude, latitude
+        )
+    except CatalogError as error:
+        report.faults.append(f"{error}; the page has no background")
+        return replace(results, lines=lines)
+    source = ": ".join(filter(None, [printable(settings.background.name), credit]))
+    provenance = [*results.provenance, (results.texts["background"], source)]
+    return replace(results, lines=lines, provenance=provenance)
 
 
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:

@@ -140,8 +140,8 @@ def _write(
     # The page has the histories of the worst pairs, if there are records
     with report.tried(folder / "report.html"):
         drawings = Drawings(histories=histories(results.worst) if histories else {})
-        page = replace(with_page_data(results, folder, outlines), drawings=drawings)
-        write_page(page, folder / "report.html")
+        page = with_page_data(results, folder, outlines, settings.report, report)
+        write_page(replace(page, drawings=drawings), folder / "report.html")
     write_overview(results, folder, report)
     return report
 
