@@ -78,7 +78,7 @@ function isolated(text) {
 function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children.flatMap(isolated));
+  made.append(...(attributes.dir ? children : children.flatMap(isolated)));
   return made;
 }
 

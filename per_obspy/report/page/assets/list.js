@@ -225,15 +225,15 @@ class PairList {
         const text = name === "probability" ? page.percent(values[i]) : page.number(factor * values[i], digits);
         made.append(element("td", { class: "number" }, text));
       } else if (name === "pair_id") {
-        const button = element("button", { type: "button" }, values[i]);
+        const button = element("button", { type: "button", dir: "auto" }, values[i]);
         button.addEventListener("click", () => page.choose(i, true));
-        made.append(element("td", { class: "name", dir: "auto" }, button));
+        made.append(element("td", { class: "name" }, button));
       } else if (name === "state") {
         made.append(element("td", { class: "state" }, page.stateOf(i).label));
       } else if (name === "risk_class") {
         const grade = page.classOf(i);
         made.append(element("td", { class: "state" }, element("span", {}, swatch(grade), grade.label)));
-      } else made.append(element("td", { class: "name", dir: "auto" }, page.stations.link(values.texts[values.codes[i]])));
+      } else made.append(element("td", { class: "name" }, page.stations.link(values.texts[values.codes[i]])));
     }
     return made;
   }
