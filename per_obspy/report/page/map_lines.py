@@ -18,6 +18,9 @@ from per_obspy.inventory.places import largest_towns
 #: The lines reach beyond the region by this share of its size, and by this many degrees at least.
 MARGIN, LEAST_MARGIN = 1.0, 2.0
 
+#: Towns that are so near to a place are amid them, degrees.
+AMID = 0.1
+
 #: Corners on a page, at most: every second, third, ... is kept of more.
 MOST_CORNERS = 20_000
 
@@ -96,12 +99,19 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
 def towns_around(
     longitude: FloatArray, latitude: FloatArray, most: int
 ) -> list[tuple[str, float, float]]:
-    """Return name, longitude and latitude of the largest towns around places (degrees)."""
+    """
+    Return name, longitude and latitude of the largest towns around places (degrees).
+
+    Those amid the places come first: the neighbourhood may have a hundred larger ones.
+    """
     known = np.isfinite(longitude) & np.isfinite(latitude)
     if not known.any():
         return []
-    low, high = _box(np.stack([longitude[known], latitude[known]], axis=1))
-    return largest_towns(low.tolist(), high.tolist(), most)
+    places = np.stack([longitude[known], latitude[known]], axis=1)
+    low, high = _box(places)
+    edges = (places.min(axis=0) - AMID, places.max(axis=0) + AMID)
+    towns = largest_towns(edges[0].tolist(), edges[1].tolist(), most)
+    return list(dict.fromkeys([*towns, *largest_towns(low.tolist(), high.tolist(), most)]))[:most]
 
 
 def beside(longitude: FloatArray, middle: float) -> FloatArray:

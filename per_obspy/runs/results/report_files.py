@@ -358,7 +358,12 @@ def write_overview(results: Results, folder: Path, report: Report) -> None:
     """Draw the map of all pairs."""
     overview = folder / "figures" / "overview.png"
     with report.tried(overview):
-        draw_overview(results.shown, results.region, overview)
+        region = results.region
+        # Stations of an ensemble have no amplitudes
+        if {"state", "pga"} <= set(results.stations):
+            used = results.stations[results.stations["state"] == "used"]
+            region = region._replace(stations=used[["longitude", "latitude", "pga"]].dropna())
+        draw_overview(results.shown, region, overview, results.language)
 
 
 def _extent(results: Results, folder: Path, most: int) -> str:
