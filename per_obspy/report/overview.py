@@ -1,6 +1,6 @@
 """Overview of a region: a map of all pairs, maps of the worst places, gaps over demands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_uppercase
 from typing import Any, NamedTuple
@@ -13,12 +13,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import METRES_PER_DEGREE
-from per_obspy.report.page.map_lines import lines_around
+from per_obspy.constants import METRES_PER_DEGREE, STANDARD_GRAVITY
+from per_obspy.report.page.map_lines import beside, continuous, lines_around, towns_around
 from per_obspy.report.results import Region
 from per_obspy.report.style import (
     FAINT_COLOUR,
@@ -28,6 +29,7 @@ from per_obspy.report.style import (
     save,
     title_name,
 )
+from per_obspy.report.texts import LANGUAGES, counted, written
 from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
 
 IntArray = NDArray[np.int64]
@@ -75,21 +77,6 @@ def frame_of(longitude: ArrayLike, latitude: ArrayLike) -> Frame:
     return Frame(float(east.min()), float(east.max()), float(north.min()), float(north.max()))
 
 
-def continuous(longitude: ArrayLike) -> FloatArray:
-    """
-    Return longitudes (degrees) without a step at the date line.
-
-    Examples
-    --------
-    >>> print(continuous([179.5, -179.5]), continuous([-71.0, 10.0]))
-    [179.5 180.5] [-71.  10.]
-    """
-    given = np.asarray(longitude, dtype=np.float64)
-    if given.size == 0 or np.ptp(given) <= 180.0:
-        return given
-    return np.where(given < 0.0, given + 360.0, given)
-
-
 #: Worst places that have a map of their own, and the pairs that each of them has at least.
 SHOWN_PLACES, FEWEST = 3, 5
 
@@ -102,6 +89,10 @@ STREETS = 5_000.0
 #: Coast lines are right to some hundred m: none on a map below this size, m.
 COARSE = 10_000.0
 COAST_COLOUR, BORDER_COLOUR = "#51708A", "#8A6F86"
+
+#: Names of towns, or amplitudes of stations, on a map at most; towns of which the names are chosen.
+MOST_LABELS, MOST_TOWNS = 12, 100
+TOWN_COLOUR = "#1F3A4D"
 
 #: Space around the points of a map, share of its longer side.
 MARGIN = 0.06
@@ -119,7 +110,7 @@ class _Points(NamedTuple):
         return _Points(self.longitude[members], self.latitude[members], self.colour[members])
 
 
-def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
+def draw_overview(table: pd.DataFrame, region: Region, path: Path, language: str = "en") -> None:
     """
     Draw maps of the pairs and stations of a region, and gaps over demands where there are any.
 
@@ -131,37 +122,46 @@ def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
         ``risk_class, longitude, latitude`` of pairs, worst first, and ``pair_id``; ``demand`` and
         ``gap`` (m) where there are any.
     region : Region
-        Title, classes, stations and epicentre.
+        Title, classes, stations and epicentre; stations with a ``pga`` (m/s2) are as large as the
+        ground shook there.
     path : Path
         PNG file.
+    language : str
+        Of the texts.
     """
     places = worst_places(table, region)
     # Their maps have a row of their own
     heights = [5.7, 3.8] if places else [5.7]
     figure = Figure(figsize=(13.0, 0.5 + sum(heights)), layout="constrained")
     parts = np.array(figure.subfigures(len(heights), 1, height_ratios=heights)).ravel().tolist()
-    whole = _draw_top(parts[0], table, region)
+    whole = _draw_top(parts[0], table, region, language)
     if places:
         _mark(whole, [frame for frame, _ in places])
-        _draw_places(parts[1], table, region, places)
+        _draw_places(parts[1], table, region, places, language)
     # One legend and one title for everything
-    _add_legend(figure, whole, table, region)
+    _add_legend(figure, whole, table, region, language)
     figure.suptitle(title_name(region.title), parse_math=False)
-    save(figure, path, region.simulated)
+    save(figure, path, region.simulated, LANGUAGES[language]["overview_simulated"])
 
 
-def _draw_top(figure: SubFigure, table: pd.DataFrame, region: Region) -> Axes:
+def _draw_top(figure: SubFigure, table: pd.DataFrame, region: Region, language: str) -> Axes:
     """Draw the map of the region, and gaps over demands where there are any; return the map."""
     has_gaps = "demand" in table
     panels = figure.subplots(1, 1 + has_gaps, squeeze=False).ravel()
     whole: Axes = panels[0]
-    draw_map(whole, table, region)
+    draw_map(whole, table, region, language)
     if has_gaps:
-        _draw_gaps(panels[1], table, region.classes)
+        _draw_gaps(panels[1], table, region.classes, LANGUAGES[language])
     return whole
 
 
-def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool = False) -> None:
+def draw_map(
+    axes: Axes,
+    table: pd.DataFrame,
+    region: Region,
+    language: str = "en",
+    around_pairs: bool = False,
+) -> None:
     """
     Draw pairs in the colours of their classes, stations and the epicentre on axes of any shape.
 
@@ -173,6 +173,8 @@ def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool
         As for :func:`draw_overview`.
     region : Region
         As for :func:`draw_overview`.
+    language : str
+        Of the texts.
     around_pairs : bool
         Show the surroundings of the pairs only, without stations and an epicentre that are further
         away: a small map of a large region would hide all pairs behind one mark.
@@ -181,11 +183,15 @@ def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool
     seen = region._replace(stations=region.stations[:0], epicentre=None) if around_pairs else region
     frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
+    labels = _Labels(axes, frame)
     _draw_stations(axes, region, frame)
+    _write_amplitudes(labels, region, language)
     _draw_coasts(axes, points, frame)
+    _write_towns(labels, points)
     _add_scale_bar(axes, frame, 0.03)
-    axes.set_title(f"{len(table):,} pairs shown", fontsize=11)
-    axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)")
+    axes.set_title(counted(language, "overview_pairs", len(table)), fontsize=11)
+    texts = LANGUAGES[language]
+    axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
     # Few ticks, so that their labels never touch
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=4))
@@ -274,26 +280,98 @@ def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:
 
 
 def _draw_stations(axes: Axes, region: Region, frame: Frame) -> None:
-    """Draw stations as small open triangles below the pairs, and the epicentre as a star."""
+    """Draw stations as open triangles below the pairs, and the epicentre as a star."""
     outline: dict[str, Any] = {"facecolors": "none", "edgecolors": "black"}
     outline |= {"linewidths": 0.8, "zorder": 2}
     places = region.stations[["longitude", "latitude"]].to_numpy(dtype=np.float64)
-    for marker, size, marks in (("^", 30.0, places), ("*", 130.0, _epicentre(region))):
+    # As large as on the page; without amplitudes all are alike
+    peaks = _amplitudes(region)
+    sizes = np.where(np.isnan(peaks), 30.0, 30.0 * (0.6 + np.minimum(1.4, 1.6 * peaks**0.5)) ** 2)
+    epicentre = _epicentre(region)
+    large = np.full(len(epicentre), 130.0)
+    for marker, size, marks in (("^", sizes, places), ("*", large, epicentre)):
         # Only those within the map, which they would widen otherwise
-        east, north = _beside(marks[:, 0], 0.5 * (frame.west + frame.east)), marks[:, 1]
-        inside = (east >= frame.west) & (east <= frame.east)
-        inside &= (north >= frame.south) & (north <= frame.north)
-        axes.scatter(east[inside], north[inside], marker=marker, s=size, **outline)
+        east, north, inside = _inside(marks, frame)
+        axes.scatter(east[inside], north[inside], marker=marker, s=size[inside], **outline)
+
+
+def _amplitudes(region: Region) -> FloatArray:
+    """Return the largest acceleration of each station, g; NaN where it is unknown."""
+    peaks = region.stations.get("pga", pd.Series(np.nan, region.stations.index))
+    return np.asarray(peaks, dtype=np.float64) / STANDARD_GRAVITY
+
+
+def _inside(places: FloatArray, frame: Frame) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return longitudes beside the middle of a frame, latitudes, and which places are in it."""
+    east, north = beside(places[:, 0], 0.5 * (frame.west + frame.east)), places[:, 1]
+    inside: NDArray[np.bool_] = (east >= frame.west) & (east <= frame.east)
+    return east, north, inside & (north >= frame.south) & (north <= frame.north)
+
+
+class _Labels:
+    """Texts beside places of a map, of which none touches an earlier one."""
+
+    def __init__(self, axes: Axes, frame: Frame) -> None:
+        self.axes = axes
+        box, tall = axes.get_window_extent(), frame.north - frame.south
+        # The map fills its axes: degrees of latitude across, a little less as titles need room
+        across = max((frame.east - frame.west) * frame.stretch, tall * box.width / box.height)
+        side = 0.5 * (0.9 * across / frame.stretch - (frame.east - frame.west))
+        self.frame = frame._replace(west=frame.west - side, east=frame.east + side)
+        # A letter of size 8 is 0.075 inches wide; the scale bar has its place
+        letter = 0.075 * across / (box.width / Figure().dpi)
+        self.letter = letter / frame.stretch, 1.8 * letter
+        bar = frame.west + 0.5 * (frame.east - frame.west), frame.south + 0.1 * tall
+        self.boxes = [(frame.west, frame.south, *bar)]
+
+    def write(self, text: str, east: float, north: float, **style: Any) -> bool:
+        """Write a text to the right of a place if it has room there."""
+        width, height = self.letter
+        left, right = east + 0.5 * width, east + (1.5 + len(text)) * width
+        box = (left, north - 0.5 * height, right, north + 0.5 * height)
+        touches = any(
+            box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
+            for other in self.boxes
+        )
+        if touches or right > self.frame.east:
+            return False
+        self.boxes.append(box)
+        offset: dict[str, Any] = {"xytext": (5.0, 0.0), "textcoords": "offset points"}
+        drawn = self.axes.annotate(
+            literal(text), (east, north), va="center", fontsize=8, **offset, **style
+        )
+        # White around the letters
+        drawn.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+        return True
+
+
+def _write_amplitudes(labels: _Labels, region: Region, language: str) -> None:
+    """Write the largest acceleration beside the stations, where they are few."""
+    places = region.stations[["longitude", "latitude"]].to_numpy(dtype=np.float64)
+    peaks = _amplitudes(region)
+    east, north, inside = _inside(places, labels.frame)
+    chosen = np.flatnonzero(inside & np.isfinite(peaks))
+    if len(chosen) <= MOST_LABELS:
+        for i in chosen.tolist():
+            labels.write(f"{written(float(peaks[i]), 2, language)} g", east[i], north[i], zorder=4)
+
+
+def _write_towns(labels: _Labels, points: _Points) -> None:
+    """Write the names of the largest towns, and a dot for each."""
+    frame, count = labels.frame, 0
+    for name, longitude, latitude in towns_around(points.longitude, points.latitude, MOST_TOWNS):
+        east, north, inside = _inside(np.array([[longitude, latitude]]), frame)
+        style: dict[str, Any] = {"style": "italic", "color": TOWN_COLOUR, "zorder": 4}
+        if inside[0] and labels.write(name, float(east[0]), float(north[0]), **style):
+            labels.axes.scatter(east, north, s=5, color=TOWN_COLOUR, zorder=3.5)
+            count += 1
+        if count == MOST_LABELS:
+            return
 
 
 def _epicentre(region: Region) -> FloatArray:
     """Return the place of the epicentre, (1, 2) or (0, 2), degrees."""
     return np.array([region.epicentre] if region.epicentre else []).reshape(-1, 2)
-
-
-def _beside(longitude: FloatArray, middle: float) -> FloatArray:
-    """Return longitudes within 180 degrees of the middle of a map."""
-    return np.asarray(middle + (longitude - middle + 180.0) % 360.0 - 180.0)
 
 
 def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
@@ -314,6 +392,7 @@ def _draw_places(
     table: pd.DataFrame,
     region: Region,
     places: Sequence[tuple[Frame, IntArray]],
+    language: str,
 ) -> None:
     """Draw the worst places, each with its number of pairs, its worst pair and a scale bar."""
     points = _points(table, region)
@@ -321,10 +400,13 @@ def _draw_places(
     for letter, panel, (frame, members) in zip(ascii_uppercase, panels, places, strict=False):
         _draw_points(panel, points.chosen(members), frame)
         _draw_stations(panel, region, frame)
+        # As wide as its place
+        panel.set_aspect(1.0 / frame.stretch, adjustable="box")
         # Without coordinates, which the whole map has
         _add_scale_bar(panel, frame, -0.03)
         worst = literal(str(table["pair_id"].iloc[int(members[0])]))[:30]
-        panel.set_title(f"{letter}: {members.size} pairs, worst {worst}", fontsize=10)
+        name = counted(language, "overview_place", members.size, letter=letter, pair=worst)
+        panel.set_title(name, fontsize=10)
         panel.set(xticks=[], yticks=[])
 
 
@@ -353,13 +435,17 @@ def _add_scale_bar(axes: Axes, frame: Frame, height: float) -> None:
     axes.text(frame.west + 1.1 * degrees, height, text, transform=place, va="center", fontsize=8)
 
 
-def _add_legend(figure: Figure, axes: Axes, table: pd.DataFrame, region: Region) -> None:
+def _add_legend(
+    figure: Figure, axes: Axes, table: pd.DataFrame, region: Region, language: str
+) -> None:
     """Add one legend below all panels, where it covers neither data nor labels."""
     handles, counts = list[Line2D](), table["risk_class"].value_counts()
+    texts = LANGUAGES[language]
     # Classes that a pair has
     for name, colour in class_colours(region.classes).items():
         if count := int(counts.get(name, 0)):
-            text = f"{literal(name)}: {count:,} pairs"
+            words = literal(texts.get(f"class_{name}", name))
+            text = counted(language, "overview_class", count, name=words)
             style: dict[str, Any] = {"marker": "o", "linestyle": "", "color": colour}
             style |= {"markeredgecolor": "black", "markeredgewidth": 0.3}
             handles += axes.plot([], [], label=text, **style)
@@ -368,11 +454,13 @@ def _add_legend(figure: Figure, axes: Axes, table: pd.DataFrame, region: Region)
     for marker, (name, present) in marks.items():
         if present:
             style = {"marker": marker, "linestyle": "", "color": "black"}
-            handles += axes.plot([], [], markerfacecolor="none", label=name, **style)
+            handles += axes.plot([], [], markerfacecolor="none", label=texts[name], **style)
     figure.legend(handles=handles, loc="outside lower left", ncols=4, fontsize=9, frameon=False)
 
 
-def _draw_gaps(axes: Axes, table: pd.DataFrame, classes: Sequence[str]) -> None:
+def _draw_gaps(
+    axes: Axes, table: pd.DataFrame, classes: Sequence[str], texts: Mapping[str, str]
+) -> None:
     """Draw gaps over demands, cm, in the colours of the classes, the worst on top."""
     colours = class_colours(classes)
     for name in reversed(colours):
@@ -385,9 +473,9 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame, classes: Sequence[str]) -> None:
     equal = np.linspace(0.0, demand, 500)
     axes.plot(equal, equal, color=MOTION_COLOUR, linewidth=0.8)
     # Next to its end, where no mark is hidden
-    axes.annotate("gap = demand", (demand, demand), ha="right", va="bottom", fontsize=8)
-    axes.set(xlabel="demand (cm)", ylabel="gap (cm)")
-    axes.set_title("gap against demand; below the line it is too small", fontsize=11)
+    axes.annotate(texts["overview_equal"], (demand, demand), ha="right", va="bottom", fontsize=8)
+    axes.set(xlabel=texts["overview_demand"], ylabel=texts["overview_gap"])
+    axes.set_title(texts["overview_gaps"], fontsize=11)
     _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand)
     _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap))
 

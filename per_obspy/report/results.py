@@ -121,7 +121,8 @@ class Results:
     outlines : sequence of (str, list of float)
         Buildings and their outlines: longitude and latitude by turns, degrees.
     lines : mapping of str to list
-        ``coast`` and ``borders``, lines of longitude and latitude by turns.
+        ``coast`` and ``borders``, lines of longitude and latitude by turns; ``background``, lines
+        of the user; ``towns``, names with longitude and latitude, the largest first.
     drawings : Drawings
         Histories, stations and sensitivities.
     record : Dataset or None
@@ -151,7 +152,7 @@ class Results:
     rejected: pd.DataFrame = field(default_factory=pd.DataFrame)
     rejections: int = 0
     outlines: Sequence[tuple[str, list[float]]] = ()
-    lines: Mapping[str, list[list[float]]] = field(default_factory=dict)
+    lines: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     drawings: Drawings = field(default_factory=Drawings)
     record: xr.Dataset | None = None
     provenance: Sequence[tuple[str, str]] = ()

@@ -108,7 +108,9 @@ def _fit_titles(figure: Figure) -> None:
             title.set_fontsize(float(title.get_fontsize()) * available / width)
 
 
-def save(figure: Figure, path: Path, simulated: bool) -> None:
+def save(
+    figure: Figure, path: Path, simulated: bool, note: str = "simulated ground motion"
+) -> None:
     """
     Write a figure as PNG, whole or not at all.
 
@@ -120,6 +122,8 @@ def save(figure: Figure, path: Path, simulated: bool) -> None:
         PNG file.
     simulated : bool
         Whether the ground motion is simulated, which is then written on the figure.
+    note : str
+        That it is.
     """
     # Room below the axes for the note
     if simulated:
@@ -127,7 +131,7 @@ def save(figure: Figure, path: Path, simulated: bool) -> None:
         figure.text(
             0.99,
             0.01,
-            "simulated ground motion",
+            note,
             ha="right",
             va="bottom",
             fontsize=9,

@@ -19,8 +19,9 @@ import pyarrow.parquet as pq
 
 from per_obspy.config import Ensemble, EnsembleScenario, Run, in_language, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, remove_file, temporary_folder, written_whole
+from per_obspy.files import content_hash, file_hash, remove_file, temporary_folder, written_whole
 from per_obspy.progress import Progress, silent
+from per_obspy.report.page.background import require_background
 from per_obspy.results.coverage import Coverage, most_first
 from per_obspy.results.parts import bounded_database, parquet_rows
 from per_obspy.results.ranked_table import ROWS, table_files, table_outputs
@@ -223,6 +224,7 @@ def screen_scenarios(
     configuration = configuration.resolve()
     settings = in_language(load(configuration, Ensemble), language)
     require_extras(settings)
+    require_background(settings.report.background)
     folder = (output or settings.output).resolve()
     _check_runs(settings, configuration, folder)
     # Each run takes its own folder, one after the other
@@ -327,6 +329,8 @@ def _head(settings: Ensemble, configuration: Path, runs: Mapping[str, Result]) -
     values = json.loads(settings.model_dump_json(context={"folder": folder}))
     scenarios = [_facts(scenario, runs[scenario.name], folder) for scenario in settings.scenario]
     content = {"configuration": values, "scenarios": scenarios}
+    if background := settings.report.background:
+        content["background"] = file_hash(background)
     key = content_hash({"version": version("per_obspy"), **content})
     # One simulated scenario makes the ensemble simulated
     simulated = any(scenario["simulated"] for scenario in scenarios)

@@ -24,6 +24,7 @@ from per_obspy.inventory.files.reading import checked_file
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.records.station_list import read_station_list
+from per_obspy.report.page.background import require_background
 from per_obspy.runs.inputs.drawn_pairs import pair_table
 from per_obspy.runs.tasks.ground_files import StationFile
 from per_obspy.screening.assignment import nearest_station
@@ -65,7 +66,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
 
 def check_inputs(settings: Run, folder: Path) -> None:
     """
-    Check the head of the pair table, the named inventories, the area, ShakeMap and station list.
+    Check heads of pair table and background, inventories, area, ShakeMap and station list.
 
     Parameters
     ----------
@@ -80,6 +81,7 @@ def check_inputs(settings: Run, folder: Path) -> None:
         If one of them cannot be read or has changed, or the table lacks a column.
     """
     pairs = settings.pairs
+    require_background(settings.report.background)
     table = pair_table(settings, folder)
     if pairs and pairs.footprints and not pairs.footprints.file.is_file():
         raise CatalogError(str(pairs.footprints.file), "no such file")

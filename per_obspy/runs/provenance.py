@@ -173,7 +173,7 @@ def _values(settings: Run, folder: Path) -> dict[str, Any]:
 
 def _input_files(settings: Run, fetched: "Fetched | None") -> list[Path]:
     """Return every input file of a run: records and their metadata, scenario and inventory."""
-    given = [settings.simulation, *_inventory_files(settings)]
+    given = [settings.simulation, settings.report.background, *_inventory_files(settings)]
     files = [path for path in given if path and path.is_file()]
     return [*input_files(settings.records, fetched), *files]
 

@@ -164,7 +164,7 @@ def _report_pairs(
         # The pieces may lack columns, the pairs of the page have all of them
         worst = worst_pairs(table, settings.totals)
         pairs = PairTable(
-            table.pieces(), table.pairs, settings.totals, outlines,
+            table.pieces(), table.pairs, settings.totals, outlines, settings.report,
             settings.geopackage, settings.spreadsheet,
         )  # fmt: skip
         results = replace(results, worst=worst, record=_record(worst, stations))
@@ -255,6 +255,7 @@ def report_design(
     )  # fmt: skip
     pairs = PairTable(
         iter([_with_flags(table)]), len(table), settings.totals, outlines_beside(settings.pairs),
+        settings.report,
         settings.geopackage, settings.spreadsheet,
     )  # fmt: skip
     write_report(results, pairs, folder, report)
@@ -307,7 +308,7 @@ def report_ensemble(
     # Buildings and outlines are those of the runs
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))
     pairs = PairTable(
-        pieces, coverage.screened, runs.totals(), runs.outlines(),
+        pieces, coverage.screened, runs.totals(), runs.outlines(), settings.report,
         settings.geopackage, settings.spreadsheet,
     )  # fmt: skip
     write_report(results, pairs, folder, report)

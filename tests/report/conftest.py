@@ -14,7 +14,7 @@ def drawn(monkeypatch):
         monkeypatch.setattr(
             importlib.import_module(f"per_obspy.report.{module}"),
             "save",
-            lambda figure, path, simulated: figures.append((figure, path, simulated)),
+            lambda figure, path, simulated, *_: figures.append((figure, path, simulated)),
         )
         return figures
 

@@ -92,7 +92,7 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
     assert chart.get_aspect() == pytest.approx(2.0, rel=0.01)
     assert (chart.get_xlabel(), chart.get_ylabel()) == ("longitude (°E)", "latitude (°N)")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["severe: 1 pairs", "high: 1 pairs", "low: 2 pairs", "station", "epicentre"]
+    assert labels == ["severe: 1 pair", "high: 1 pair", "low: 2 pairs", "station", "epicentre"]
 
 
 def test_gaps_are_drawn_over_demands_in_centimetres(overview):

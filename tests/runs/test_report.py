@@ -185,6 +185,22 @@ def test_hostile_names_and_values_reach_every_file(copied, call):
     assert not {"\x1b", "\u202e"} & set(output)
 
 
+def test_a_background_that_cannot_be_read_leaves_the_page(copied, call):
+    # would catch: no page for a damaged file, or a run of hours before a missing one is found
+    text = (copied / "run.toml").read_text()
+    (copied / "run.toml").write_text(f'{text}\n[report]\nbackground = "roads.pmtiles"\n')
+    code, _, errors = call("run", copied / "run.toml")
+    assert code == 2
+    assert errors.splitlines()[-1].endswith("roads.pmtiles: no such file")
+    (copied / "roads.pmtiles").write_bytes(b"PMTiles\x03" + bytes(200))
+    code, _, errors = call("report", copied / "run.toml")
+    assert code == 0
+    (line,) = [line for line in errors.splitlines() if line.startswith("per-obspy: ")]
+    assert "roads.pmtiles: " in line
+    assert line.endswith("; the page has no background")
+    assert (copied / "out" / "report.html").exists()
+
+
 @pytest.mark.parametrize("failing", ["draw_overview", "_write_layers"])
 def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, failing):
     # would catch a traceback after all the work, totals of some rows, and an old picture

@@ -12,7 +12,7 @@ import re
 import sqlite3
 import warnings
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from operator import itemgetter
@@ -95,8 +95,7 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     CatalogError
         If the file is missing, or cannot be read as its suffix indicates.
     """
-    if problem := _wrong_file(file):
-        raise CatalogError(str(file), problem)
+    require_layer_file(file)
     # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
     # of .osm.pbf (reasoned)
     size = file.stat().st_size
@@ -108,14 +107,20 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     return raw
 
 
-def _wrong_file(file: Path) -> str:
-    """Return why a file is not read, by its name and its kind; empty if it is."""
+def require_layer_file(file: Path, others: Sequence[str] = ()) -> None:
+    """Raise CatalogError if a file is no layer by its name, its kind and its first bytes."""
+    if problem := _wrong_file(file, others):
+        raise CatalogError(str(file), problem)
+
+
+def _wrong_file(file: Path, others: Sequence[str]) -> str:
+    """Return why a file is not read, empty if it is; the caller reads other suffixes too."""
     suffix = file.suffix.lower()
     if not file.exists():
         return "no such file"
     # GDAL knows other suffixes, but not whether they hold outlines
     if suffix not in SUFFIXES:
-        return f"unknown suffix {file.suffix!r}, expected one of {', '.join(SUFFIXES)}"
+        return f"unknown suffix {file.suffix!r}, expected one of {', '.join((*SUFFIXES, *others))}"
     if not file.is_file():
         return "is no regular file"
     if suffix == ".gz" and Path(file.stem).suffix.lower() not in _PACKED:

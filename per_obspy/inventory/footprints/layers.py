@@ -63,7 +63,7 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     file = Path(path)
     raw = read_raw_layer(file, layer)
     _require_outlines(file, raw)
-    transformer, is_projected = _to_degrees(file, raw.crs)
+    transformer, is_projected = to_degrees(file, raw.crs)
     # Outlines that can be used and reasons for the others, block by block
     outlines, rejected, good = [], list(raw.broken), np.ones(len(raw.wkb), dtype=bool)
     for start, original in blocks(raw.wkb):
@@ -118,7 +118,7 @@ def _require_outlines(file: Path, raw: RawLayer) -> None:
         raise CatalogError(str(file), problem)
 
 
-def _to_degrees(file: Path, crs: Any) -> tuple[pyproj.Transformer, bool]:
+def to_degrees(file: Path, crs: Any) -> tuple[pyproj.Transformer, bool]:
     """Return the transformation to longitude and latitude, and whether it is from a projection."""
     if crs is None:
         raise CatalogError(str(file), "no coordinate reference system (a Shapefile needs its .prj)")

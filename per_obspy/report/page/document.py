@@ -73,7 +73,7 @@ LONGEST_SOURCE = 500
 #: Kinds of texts that the script never shows by their keys.
 HIDDEN = (
     "flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_", "alert_",
-    "page_", "map_title", "coverage_some", "coverage_search",
+    "page_", "map_title", "overview_", "coverage_some", "coverage_search",
 )  # fmt: skip
 
 #: Columns of a building on the page, and their kinds.

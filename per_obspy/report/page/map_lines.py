@@ -10,12 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.inventory.places import largest_towns
 
 #: The lines reach beyond the region by this share of its size, and by this many degrees at least.
 MARGIN, LEAST_MARGIN = 1.0, 2.0
+
+#: Towns that are so near to a place are amid them, degrees.
+AMID = 0.1
 
 #: Corners on a page, at most: every second, third, ... is kept of more.
 MOST_CORNERS = 20_000
@@ -43,6 +47,21 @@ class _Lines(NamedTuple):
     is_border: NDArray[np.bool_]
 
 
+def continuous(longitude: ArrayLike) -> FloatArray:
+    """
+    Return longitudes (degrees) without a step at the date line.
+
+    Examples
+    --------
+    >>> print(continuous([179.5, -179.5]), continuous([-71.0, 10.0]))
+    [179.5 180.5] [-71.  10.]
+    """
+    given = np.asarray(longitude, dtype=np.float64)
+    if given.size == 0 or np.nanmax(given) - np.nanmin(given) <= 180.0:
+        return given
+    return np.where(given < 0.0, given + 360.0, given)
+
+
 def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[list[float]]]:
     """
     Return the coast lines and borders around places.
@@ -50,39 +69,70 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
     Parameters
     ----------
     longitude, latitude : (n_places,) ndarray
-        Degrees; places that are not finite are left out.
+        Degrees; places that are not finite are left out, longitudes have no step at the date line.
 
     Returns
     -------
     dict
-        ``coast`` and ``borders``: lines of longitude and latitude by turns, degrees. Both are empty
-        without a place.
+        ``coast`` and ``borders``: lines of longitude and latitude by turns, degrees; longitudes are
+        within 180 degrees of the places. Both are empty without a place.
     """
     found: dict[str, list[list[float]]] = {"coast": [], "borders": []}
     known = np.isfinite(longitude) & np.isfinite(latitude)
     if not known.any():
         return found
     # Corners near the places, of which few enough are kept
-    world = _world()
-    near = _near(world.corners, np.stack([longitude[known], latitude[known]], axis=1))
+    world, places = _world(), np.stack([longitude[known], latitude[known]], axis=1)
+    middle = 0.5 * float(places[:, 0].min() + places[:, 0].max())
+    corners = np.stack([beside(world.corners[:, 0], middle), world.corners[:, 1]], axis=1)
+    near = _near(corners, places)
     stride = 1 + int(near.sum()) // MOST_CORNERS
     # Line by line, with its index of the first corner
     starts = np.concatenate([[0], world.ends[:-1]])
     for line in np.flatnonzero(np.add.reduceat(near, starts, dtype=np.int64)):
         part = slice(starts[line], world.ends[line])
         kind = "borders" if world.is_border[line] else "coast"
-        found[kind] += _pieces(world.corners[part], near[part], stride)
+        found[kind] += _pieces(corners[part], near[part], stride)
     return found
+
+
+def towns_around(
+    longitude: FloatArray, latitude: FloatArray, most: int
+) -> list[tuple[str, float, float]]:
+    """
+    Return name, longitude and latitude of the largest towns around places (degrees).
+
+    Those amid the places come first: the neighbourhood may have a hundred larger ones.
+    """
+    known = np.isfinite(longitude) & np.isfinite(latitude)
+    if not known.any():
+        return []
+    places = np.stack([longitude[known], latitude[known]], axis=1)
+    low, high = _box(places)
+    edges = (places.min(axis=0) - AMID, places.max(axis=0) + AMID)
+    towns = largest_towns(edges[0].tolist(), edges[1].tolist(), most)
+    return list(dict.fromkeys([*towns, *largest_towns(low.tolist(), high.tolist(), most)]))[:most]
+
+
+def beside(longitude: FloatArray, middle: float) -> FloatArray:
+    """Return longitudes within 180 degrees of the middle of a map."""
+    return np.asarray(middle + (longitude - middle + 180.0) % 360.0 - 180.0)
 
 
 def _near(corners: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
     """Return a mask of the corners near places, and of their neighbours."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
-    near = ((corners >= low - margin) & (corners <= high + margin)).all(axis=1)
+    low, high = _box(places)
+    near = ((corners >= low) & (corners <= high)).all(axis=1)
     # Steps into the box and out of it belong to the lines
     joined: NDArray[np.bool_] = near | np.roll(near, 1) | np.roll(near, -1)
     return joined
+
+
+def _box(places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and highest longitude and latitude of a region around places."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
+    return low - margin, high + margin
 
 
 def _pieces(corners: FloatArray, near: NDArray[np.bool_], stride: int) -> list[list[float]]:

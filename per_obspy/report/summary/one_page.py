@@ -85,7 +85,7 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     legend = _write_legend(figure, results, bottom + 0.005)
     box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
     axes, texts = figure.add_axes(box), results.texts
-    draw_map(axes, results.shown, results.region, around_pairs=True)
+    draw_map(axes, results.shown, results.region, results.language, around_pairs=True)
     # Labels in the language of the summary
     axes.set_title(results.counted("map_title", len(results.shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])

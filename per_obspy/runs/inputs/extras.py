@@ -15,6 +15,8 @@ def require_extras(settings: Run | Design | Ensemble) -> None:
     """
     if settings.geopackage:
         require_extra("gis", "pyogrio", "shapely")
+    if settings.report.background is not None:
+        require_extra("gis", "pyogrio", "pyproj", "shapely")
     if settings.spreadsheet:
         require_extra("spreadsheet", "openpyxl")
     if isinstance(settings, Run) and settings.totals.h3 is not None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.report.page.map_lines import MOST_CORNERS, lines_around
+from per_obspy.report.page.map_lines import MOST_CORNERS, lines_around, towns_around
 
 
 def distance(lines, longitude, latitude):
@@ -48,3 +48,12 @@ def test_without_a_place_there_are_no_lines():
     empty = {"coast": [], "borders": []}
     assert lines_around(np.array([np.nan]), np.array([1.0])) == empty
     assert lines_around(np.empty(0), np.empty(0)) == empty
+
+
+def test_towns_amid_the_places_come_before_larger_ones_around():
+    # would catch: only towns of Los Angeles on the map of Ridgecrest
+    towns = towns_around(np.array([-117.8, -117.5]), np.array([35.5, 35.8]), 20)
+    names = [name for name, _, _ in towns]
+    assert len(names) == 20
+    assert names[0] == "Ridgecrest"
+    assert names.index("China Lake Acres") < names.index("Los Angeles")

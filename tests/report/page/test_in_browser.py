@@ -424,6 +424,71 @@ def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkey
     assert page.page.evaluate(picture) not in (whole, fewer)
 
 
+#: Texts that the map draws with white around them, and their boxes.
+TOWNS = """() => {
+  const [drawn, proto] = [[], CanvasRenderingContext2D.prototype];
+  const own = proto.strokeText;
+  proto.strokeText = function (...text) { drawn.push([...text, this.measureText(text[0]).width]); };
+  window.dispatchEvent(new Event("beforeprint"));
+  proto.strokeText = own;
+  return drawn;
+}"""
+
+
+def test_map_names_the_largest_towns_and_draws_the_background(opened):
+    data = page_data(pair_table(12))
+    # Two at one place, of which the larger is named; then more than there is room for
+    towns = [("Largest", 13.15, 43.09), ("Hidden", 13.15, 43.09)]
+    towns += [(f"T{i}", 13.02 + 0.03 * (i % 6), 43.02 + 0.03 * (i // 6)) for i in range(36)]
+    page = opened(replace(data, lines={"towns": towns}))
+    drawn = page.page.evaluate(TOWNS)
+    assert len(drawn) == 12
+    assert drawn[0][0] == "Largest"
+    assert "Hidden" not in [text for text, *_ in drawn]
+    for (_, x1, y1, width1), (_, x2, y2, width2) in pairwise(sorted(drawn, key=lambda one: one[1])):
+        assert abs(y1 - y2) > 10 or x1 + width1 < x2 or x2 + width2 < x1
+    # A street of the user: first corner and steps of 1 m
+    street = [[1_290_000, 4_320_500, 50_000, 0]]
+    other = opened(replace(data, lines={"towns": towns, "background": street}))
+    pictures = {
+        one.page.evaluate("document.getElementById('map').toDataURL()") for one in (page, other)
+    }
+    assert len(pictures) == 2
+
+
+def test_pairs_on_both_sides_of_the_date_line_are_neighbours(opened):
+    table = pair_table(2).assign(latitude=-16.8, longitude=[179.99, -179.99])
+    for name in ("longitude_1", "longitude_2"):
+        table[name] = table["longitude"]
+    table["latitude_1"] = table["latitude_2"] = -16.8
+    page = opened(page_data(table))
+    page.page.locator("#map").scroll_into_view_if_needed()
+    box = page.page.locator("#map").bounding_box()
+    # 88 % of the map, the western one left
+    for side, name in ((-0.44, "P0000000"), (0.44, "P0000001")):
+        page.page.mouse.click(box["x"] + (0.5 + side) * box["width"], box["y"] + box["height"] / 2)
+        assert name in page.page.inner_text("#detail h2")
+
+
+def test_names_from_right_to_left_leave_the_order_of_a_sentence(opened):
+    data = page_data(pair_table(12, ["חיפה 12"]))
+    page = opened(replace(data, areas=data.areas.assign(area=["חיפה", "ירושלים"])))
+    # Each name, then its coordinates to the right of it
+    places = page.page.evaluate(
+        """() => [...document.querySelectorAll("#todo bdi")].map((name) => {
+          const after = document.createRange();
+          after.setStart(name.nextSibling, 0);
+          after.setEnd(name.nextSibling, 6);
+          const [one, two] = [name.getBoundingClientRect(), after.getBoundingClientRect()];
+          return [one.top === two.top, two.left - one.right];
+        })"""
+    )
+    assert len(places) == 3  # the worst pair and two areas
+    assert all(abs(apart) < 3 for is_line, apart in places if is_line)
+    button = page.page.locator("#pairs tbody tr:first-child button").first
+    assert button.evaluate("e => getComputedStyle(e).direction") == "rtl"
+
+
 def test_hostile_names_are_texts_and_no_formulas(opened):
     page = opened(with_region(page_data(pair_table(30, HOSTILE)), title=HOSTILE[0]))
     assert page.page.inner_text("h1") == HOSTILE[0]

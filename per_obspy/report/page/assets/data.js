@@ -59,10 +59,26 @@ READERS.names = READERS.choice;
 
 // Elements: texts are always set as texts, never as markup.
 
+const RIGHT_TO_LEFT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc](?:[^\p{Letter}\p{Number},;]*[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc])*/gu;
+
+// Words that run from right to left stand by themselves, so that what follows them keeps its order
+function isolated(text) {
+  if (typeof text !== "string" || text.search(RIGHT_TO_LEFT) < 0) return [text];
+  const parts = [];
+  let at = 0;
+  for (const found of text.matchAll(RIGHT_TO_LEFT)) {
+    const word = document.createElement("bdi");
+    word.textContent = found[0];
+    parts.push(text.slice(at, found.index), word);
+    at = found.index + found[0].length;
+  }
+  return [...parts, text.slice(at)];
+}
+
 function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
+  made.append(...(attributes.dir ? children : children.flatMap(isolated)));
   return made;
 }
 
@@ -75,4 +91,8 @@ function drawing(name, attributes = {}, text = null) {
 
 function byId(name) {
   return document.getElementById(name);
+}
+
+function say(name, text) {
+  byId(name).replaceChildren(...isolated(text));
 }

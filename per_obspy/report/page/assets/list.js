@@ -225,7 +225,7 @@ class PairList {
         const text = name === "probability" ? page.percent(values[i]) : page.number(factor * values[i], digits);
         made.append(element("td", { class: "number" }, text));
       } else if (name === "pair_id") {
-        const button = element("button", { type: "button" }, values[i]);
+        const button = element("button", { type: "button", dir: "auto" }, values[i]);
         button.addEventListener("click", () => page.choose(i, true));
         made.append(element("td", { class: "name" }, button));
       } else if (name === "state") {

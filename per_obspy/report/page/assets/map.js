@@ -4,11 +4,14 @@
 const MARK = 5; // pixels: a pair whose line would be shorter is a square
 const COARSE = 12000; // pixels per degree up to which coast lines are drawn: 1 pixel is 9 m
 const PICK = 9; // pixels: how near a click must be
+const MOST_TOWNS = 12; // names of towns at a time
+const STEP = 1e-5; // degrees: a step of the background
 
 class PairMap {
   constructor(canvas, page) {
     this.canvas = canvas;
     this.page = page;
+    this.background = (page.content.background || []).map(unfolded);
     this.listeners();
     this.order = null;
     this.fit();
@@ -32,8 +35,12 @@ class PairMap {
   fit() {
     if (!this.ends) this.setPlaces();
     const box = [Infinity, Infinity, -Infinity, -Infinity];
-    const include = (x, y) => {
-      if (!Number.isFinite(x + y)) return;
+    let first = null;
+    const include = (longitude, y) => {
+      if (!Number.isFinite(longitude + y)) return;
+      // Places on both sides of the date line are neighbours
+      if (first === null) first = longitude;
+      const x = first + aroundZero(longitude - first);
       box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y);
       box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
     };
@@ -59,11 +66,11 @@ class PairMap {
     this.draw();
   }
 
-  x(longitude) { return this.width / 2 + (longitude - this.centre[0]) * this.shrink * this.scale; }
+  x(longitude) { return this.width / 2 + aroundZero(longitude - this.centre[0]) * this.shrink * this.scale; }
   y(latitude) { return this.height / 2 - (latitude - this.centre[1]) * this.scale; }
   place(x, y) {
     return [
-      this.centre[0] + (x - this.width / 2) / (this.shrink * this.scale),
+      aroundZero(this.centre[0] + (x - this.width / 2) / (this.shrink * this.scale)),
       this.centre[1] - (y - this.height / 2) / this.scale,
     ];
   }
@@ -82,6 +89,8 @@ class PairMap {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.lineCap = "round";
+    this.labels = [];
+    this.drawLines(pen, this.background, "#a9aca6", 0.9);
     // Coast lines are right to some hundred metres: none where that would mislead
     if (this.scale < COARSE) {
       this.drawLines(pen, this.page.content.coast, "#51708a", 1.2);
@@ -91,6 +100,7 @@ class PairMap {
     this.drawOutlines(pen);
     this.drawStations(pen);
     this.drawPairs(pen);
+    this.drawTowns(pen);
     this.drawEpicentre(pen);
     this.drawScale(pen);
   }
@@ -100,10 +110,15 @@ class PairMap {
     pen.lineWidth = width;
     pen.setLineDash(dash);
     pen.beginPath();
+    // A step around the world is none
+    const half = 180 * this.shrink * this.scale;
     for (const line of lines || []) {
+      let before = Infinity;
       for (let i = 0; i < line.length; i += 2) {
-        if (i) pen.lineTo(this.x(line[i]), this.y(line[i + 1]));
-        else pen.moveTo(this.x(line[0]), this.y(line[1]));
+        const x = this.x(line[i]);
+        if (Math.abs(x - before) < half) pen.lineTo(x, this.y(line[i + 1]));
+        else pen.moveTo(x, this.y(line[i + 1]));
+        before = x;
       }
     }
     pen.stroke();
@@ -228,9 +243,39 @@ class PairMap {
       pen.closePath();
       pen.stroke();
       const amplitude = peak ? ` ${this.page.number(peak, 2)} g` : "";
-      if (named) pen.fillText(name + amplitude, x + 3 + 6 * size, y + 4);
+      const [text, right] = [isolatedName(name) + amplitude, x + 3 + 6 * size];
+      if (named && this.hasRoom(pen, text, right, y + 4)) pen.fillText(text, right, y + 4);
     }
     pen.setLineDash([]);
+  }
+
+  // Whether a text touches no earlier one, whose place it then takes
+  hasRoom(pen, text, x, y) {
+    const box = [x, y - 10, x + pen.measureText(text).width, y + 4];
+    if (this.labels.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) return false;
+    this.labels.push(box);
+    return true;
+  }
+
+  // Names of the largest towns that are seen, as far as there is room
+  drawTowns(pen) {
+    pen.font = "italic 12px sans-serif";
+    pen.strokeStyle = "#ffffffd0";
+    pen.lineJoin = "round";
+    let count = 0;
+    for (const [name, longitude, latitude] of this.page.content.towns || []) {
+      const [x, y, text] = [this.x(longitude), this.y(latitude), isolatedName(name)];
+      // Beside the buttons, above the scale
+      const fits = x > 60 && x + pen.measureText(text).width + 8 < this.width && y > 12 && y < this.height - 40;
+      if (count === MOST_TOWNS || !fits || !this.hasRoom(pen, text, x + 6, y - 4)) continue;
+      // White around the letters: pairs are below
+      pen.lineWidth = 3;
+      pen.strokeText(text, x + 6, y - 4);
+      pen.fillStyle = "#1f3a4d";
+      pen.fillText(text, x + 6, y - 4);
+      pen.fillRect(x - 1.5, y - 1.5, 3, 3);
+      count += 1;
+    }
   }
 
   drawEpicentre(pen) {
@@ -376,6 +421,23 @@ class PairMap {
     event.preventDefault();
     actions[event.key]();
   }
+}
+
+// Degrees within half a turn of zero
+function aroundZero(degrees) {
+  return degrees - 360 * Math.round(degrees / 360);
+}
+
+// A line of steps as longitude and latitude by turns
+function unfolded(steps) {
+  const line = new Float64Array(steps.length);
+  for (let i = 0; i < steps.length; i += 1) line[i] = STEP * steps[i] + (i > 1 ? line[i - 2] : 0);
+  return line;
+}
+
+// A name on a canvas, whose direction does not change what follows it
+function isolatedName(name) {
+  return name.search(RIGHT_TO_LEFT) < 0 ? name : `\u2068${name}\u2069`;
 }
 
 function contains(ring, x, y) {

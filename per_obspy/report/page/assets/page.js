@@ -135,12 +135,12 @@ class Page {
     for (const place of document.querySelectorAll("[data-text]")) place.textContent = this.t(place.dataset.text);
     for (const place of document.querySelectorAll("[data-label]")) place.setAttribute("aria-label", this.t(place.dataset.label));
     document.title = `${content.title} – per_obspy`;
-    byId("title").textContent = content.title;
+    say("title", content.title);
     this.fillAlert();
     this.fillCoverage();
-    byId("event").textContent = content.event;
+    say("event", content.event);
     byId("revision").textContent = content.revision || "";
-    byId("expected").textContent = content.expected || "";
+    say("expected", content.expected || "");
     const lacks = (content.tables[3] && content.tables[3].left_out) || [];
     byId("lacks").textContent = lacks.length ? this.t("export_lacks", { names: lacks.slice(0, 30).join(", ") }) : "";
     byId("simulated").hidden = !content.simulated;
@@ -158,7 +158,7 @@ class Page {
     const { level, colour, sentence, status, levels } = this.content.alert;
     byId("alert").style.borderColor = colour;
     byId("alert").querySelector("strong").textContent = `${level}.`;
-    byId("alert").querySelector("span").textContent = sentence;
+    byId("alert").querySelector("span").replaceChildren(...isolated(sentence));
     byId("status").textContent = [status, levels].join(" ");
   }
 
@@ -225,7 +225,7 @@ class Page {
     const head = element("tr", {}, ...heads.map((text, i) => element("th", { scope: "col", class: isNumber[i] ? "number" : "name" }, text)));
     const body = rows.map((row) => element("tr", {}, ...row.map((cell) => (typeof cell === "number"
       ? element("td", { class: "number" }, this.short(cell))
-      : element("td", { class: cell.length > 30 ? "text" : "name" }, cell)))));
+      : element("td", { class: cell.length > 30 ? "text" : "name", dir: "auto" }, cell)))));
     section.querySelector("div").append(element("table", {}, element("thead", {}, head), element("tbody", {}, ...body)));
   }
 }
