@@ -2,6 +2,8 @@
 # Run a command of the environment as .venv/bin/per-obspy, or activate it: source .venv/bin/activate
 PYTHON ?= python3
 BIN := .venv/bin
+# Where a machine forbids compiled modules, every process would compile package and tests anew
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo figures test test-uncompiled test-long test-all workflows rehearsal check docs wheel benchmark extras constraints clean
 
