@@ -31,7 +31,7 @@ test: .venv/test
 	$(MAKE) --no-print-directory test-uncompiled
 
 test-uncompiled: .venv/test
-	@echo "== the kernels' tests once more without the compiler, which finds no index out of bounds"
+	@echo "== the kernels' tests once more without the compiler, where an index out of bounds is an error"
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -m "not compiled" tests/kernels
 
 test-long: .venv/test
