@@ -120,9 +120,10 @@ def test_the_program_ends_where_no_exception_arrives(script, number):
     assert seconds < PROMISED
 
 
-@pytest.mark.parametrize("rows", ["numbers", "generator"])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_query_of_the_database_ends_with_the_program(tmp_path, rows, number):
+@pytest.mark.parametrize(
+    ("number", "rows"), [(signal.SIGTERM, "numbers"), (signal.SIGINT, "generator")]
+)
+def test_a_query_of_the_database_ends_with_the_program(tmp_path, number, rows):
     # Mutations: the error of the query instead of the end; its threads not interrupted
     running = subprocess.Popen(
         [sys.executable, "-c", IN_DATABASE, str(tmp_path), rows],

@@ -20,18 +20,9 @@ import pytest
 import per_obspy
 from per_obspy.runs.output_folder import locked_folder
 
-from ..runs.small_run import plain_reports
-
 CHECKOUT = Path(__file__).parents[2]
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap"
 ROW = "a,0.3,0.0,10,0.3001,0.0,12,0.05"
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _plain_reports():
-    """Write figures, PDF and page of runs as short files: no test here looks at one."""
-    with plain_reports():
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -43,8 +43,8 @@ def small_run(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def forked() -> Iterator[None]:
-    """Fork workers from a server, as commands do: fresh ones load all libraries, seconds each."""
+    """Fork workers from one server, as commands do: fresh ones load libraries for seconds."""
     with forked_workers():
         yield
