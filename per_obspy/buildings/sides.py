@@ -228,12 +228,12 @@ def _prevention(sides: Sides, neighbour: pd.Series) -> dict[str, FloatArray | ND
 
 def measures_sentence(missing: float, damping: float, bumper: float, neighbour: str) -> str:
     """Return every measure for one building in words."""
-    parts = [f"up to {max(missing, SHORTEST):.3f} m more gap (to {neighbour} first)"]
+    sentence = f"up to {max(missing, SHORTEST):.3f} m more gap (to {neighbour} first)"
     if damping > 0.0:
-        parts.append(f"or {damping:.2f} of critical more damping in it and its neighbours")
+        sentence += f"; or {damping:.2f} of critical more damping in it and its neighbours"
     if bumper < 1.0:
-        parts.append(f"softened by bumpers of restitution {bumper:.2f} or less")
-    return "; ".join(parts)
+        sentence += f"; softened by bumpers of restitution {bumper:.2f} or less"
+    return sentence
 
 
 def _rows(sides: Sides) -> NDArray[np.object_]:

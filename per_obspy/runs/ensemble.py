@@ -252,7 +252,11 @@ def _joined(
 ) -> dict[str, Any]:
     """Join the risk tables of the runs and return the results' part of ``ensemble.json``."""
     facts = {"name": settings.name, "simulated": str(simulated).lower()}
-    tables = {name: _risk_table(result) for name, result in runs.items()}
+    # A run without a usable pair has no table
+    tables = {
+        name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
+        for name, one in runs.items()
+    }
     scenarios = Scenarios(tables, settings.weights, settings.yearly)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
     # Results of the runs know buildings, stations and records
@@ -316,11 +320,6 @@ def _check_runs(settings: Ensemble, configuration: Path, folder: Path) -> None:
 def _prefixed(name: str, progress: Progress) -> Progress:
     """Return a progress callback that reports a run's stages under the name of its scenario."""
     return lambda stage, done, total: progress(f"{name}: {stage}", done, total)
-
-
-def _risk_table(result: Result) -> list[Path]:
-    """Return the files of the risk table of a run, none without a usable pair."""
-    return table_files(result.folder) if table_outputs(result.record["outputs"]) else []
 
 
 def _head(settings: Ensemble, configuration: Path, runs: Mapping[str, Result]) -> dict[str, Any]:

@@ -95,13 +95,8 @@ def check_inputs(settings: Run, folder: Path) -> None:
         read_shakemap(settings.records.shakemap, settings.records.shakemap_uncertainty)
     if settings.records and settings.records.stationlist:
         read_station_list(settings.records.stationlist)
-    if not is_pending:
-        _check_area(settings, folder)
-
-
-def _check_area(settings: Run, folder: Path) -> None:
-    """Check that the pairs have the column of the areas of the totals."""
-    area = settings.totals.area
+    # The column of the areas of the totals
+    area = None if is_pending else settings.totals.area
     if area is not None and area not in _pair_columns(settings, folder):
         raise CatalogError("totals", f"area: the pair table has no column {area!r}")
 

@@ -10,6 +10,8 @@ from per_obspy.kernels.pounding_events import contact as log_columns
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.pounding.kernel_tables import KeptLogs, records_in_steps
 from per_obspy.pounding.row_maxima import (
+    _run_alone,
+    _run_in_lanes,
     packed_rows,
     run_logged_block,
     run_row_blocks,
@@ -90,9 +92,11 @@ def test_a_step_without_end_is_an_error(size):
         run_logged_block(record, start, firsts, np.zeros(1), none, KeptLogs(1, 4096))
 
 
-def test_a_log_that_is_too_short_grows():
-    # catches: impacts beyond the room that are counted from memory that holds none
-    start, firsts = rows_at_rest([4], 0.01, seed=5)
+@pytest.mark.parametrize(("size", "run"), [(4, _run_in_lanes), (33, _run_alone)])
+def test_a_log_that_is_too_short_ends_the_run_and_grows(size, run):
+    # catches: impacts beyond the room that are counted from memory that holds none, minutes of
+    # impacts before a row is refused for their number
+    start, firsts = rows_at_rest([size], 0.01, seed=5)
     record = records_in_steps(
         np.stack([5 * np.sin(np.arange(200.0) / 8), np.zeros(200)]), [1], 0.02
     )[1]
@@ -100,8 +104,11 @@ def test_a_log_that_is_too_short_grows():
     lines, logs = run_logged_block(*arguments, KeptLogs(1, 4096))
     used = int(lines[:, columns.IMPACTS].sum())
     _, grown = run_logged_block(*arguments, KeptLogs(1, 3))
-    assert used > 3
     assert_array_equal(grown[0, :used], logs[0, :used])
+    short, north = np.empty((1, 3, log_columns.LOG_COLUMNS)), (np.ones(1), np.zeros(1))
+    assert not run(record, start, short, firsts, north, np.zeros(1, dtype=np.int64))
+    # one step too far at most, of many
+    assert 3 < start[:, columns.IMPACTS].sum() < used / 2
 
 
 def test_lanes_without_contact_give_the_spectrum():

@@ -62,7 +62,7 @@ def requested_run(
     # Records and pairs
     records, pairs = _roles(first, second, changed)
     pairs = pairs and str(_one_table(pairs))
-    folder = (output or _default_output(records, pairs)).absolute()
+    folder = (output or RESULTS / _stems("-", records, pairs)).absolute()
     content = run_content(records, pairs, folder)
     settings = checked(Run, merged(content, changed))
     results = _shown(output or settings.output)
@@ -83,7 +83,9 @@ def run_content(records: str | None, pairs: str | None, output: Path) -> dict[st
         Folder of the results.
     """
     pairs = pairs and str(_one_table(pairs))
-    content = dict[str, Any](name=_title(records, pairs), output=str(output.absolute()))
+    content = dict[str, Any](
+        name=_stems(", ", records, pairs) or "run", output=str(output.absolute())
+    )
     if records is not None:
         content |= _records_content(records, output)
     if pairs is not None:
@@ -266,14 +268,9 @@ def _require_apart(settings: Run) -> None:
         raise CatalogError(str(settings.output), reason)
 
 
-def _default_output(records: str | None, pairs: str | None) -> Path:
-    """Return the default folder of the results, made of the names of the inputs."""
-    return RESULTS / "-".join(_stem(one) for one in (records, pairs) if one is not None)
-
-
-def _title(records: str | None, pairs: str | None) -> str:
-    """Return the title of tables and figures."""
-    return ", ".join(_stem(one) for one in (records, pairs) if one is not None) or "run"
+def _stems(between: str, *arguments: str | None) -> str:
+    """Return the names of the inputs that there are."""
+    return between.join(_stem(one) for one in arguments if one is not None)
 
 
 def _stem(argument: str) -> str:

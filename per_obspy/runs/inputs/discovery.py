@@ -51,18 +51,14 @@ def found_inputs(folder: Path) -> Found:
     single = [path for path in loose if path not in whole]
     records += [path for path in whole if _are_records([path])]
     records += [folder] if _are_records(single) else []
-    # Subfolders by their content
-    for path in _subfolders(folder):
+    # Subfolders by their content, hidden ones and links left out
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(".") or not path.is_dir() or path.is_symlink():
+            continue
         kind = kind_of(path)
         pairs += [path] if kind in PAIR_KINDS else []
         records += [path] if kind is Kind.RECORDS and _are_records(_first_files(path)) else []
     return Found(records, pairs)
-
-
-def _subfolders(folder: Path) -> list[Path]:
-    """Return the folders in a folder, hidden ones and links left out."""
-    shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
-    return [path for path in shown if path.is_dir() and not path.is_symlink()]
 
 
 def _first_files(folder: Path) -> list[Path]:
@@ -98,7 +94,10 @@ def write_first_configuration(
     # Named ones count, else the only one of its kind
     chosen_records, said_records = _chosen(records, found.records, RECORD_KINDS, "records")
     chosen_pairs, said_pairs = _chosen(pairs, found.pairs, PAIR_KINDS, "pairs")
-    content = run_content(chosen_records, chosen_pairs, _output(folder, chosen_records))
+    # Results are next to the configuration, but not among the records
+    is_inside = chosen_records and folder.is_relative_to(Path(chosen_records).absolute())
+    output = folder.parent / f"{folder.name}_results" if is_inside else folder / RESULTS
+    content = run_content(chosen_records, chosen_pairs, output)
     relative = with_paths(content, Run, lambda one: os.path.relpath(one, folder))
     text = commented(Run, relative, _heading(path))
     with written_whole(path) as part:
@@ -141,12 +140,6 @@ def _chosen(
         return None, f"{role}: none found here; fill in the section [{role}]"
     names = ", ".join(path.name for path in found)
     return None, f"{role}: several found ({names}); fill in the section [{role}]"
-
-
-def _output(folder: Path, records: str | None) -> Path:
-    """Return the folder of the results: next to the configuration, but not among the records."""
-    is_inside = records is not None and folder.is_relative_to(Path(records).absolute())
-    return folder.parent / f"{folder.name}_results" if is_inside else folder / RESULTS
 
 
 def _heading(path: Path) -> tuple[str, ...]:

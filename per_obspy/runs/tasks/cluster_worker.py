@@ -35,7 +35,6 @@ _SOURCES = {".py", ".csv"}
 class Versions(NamedTuple):
     """Versions on which results depend."""
 
-    #: Version of each.
     per_obspy: str
     python: str
     numpy: str
@@ -62,13 +61,10 @@ class Shared(NamedTuple):
 class SentTask(NamedTuple):
     """A task on its way to a worker."""
 
-    #: The pickled task; empty if it is in a file.
+    #: The pickled task; empty if it is in a file of the shared folder, with its SHA-256.
     content: bytes
-    #: In the shared folder.
     file: Path | None
-    #: SHA-256 of the file's content.
     hash: str
-    #: The shared folder.
     shared: Shared
     #: Those of the client.
     versions: Versions
@@ -77,16 +73,13 @@ class SentTask(NamedTuple):
 class Outcome(NamedTuple):
     """Outcome of a task on a worker."""
 
-    #: Its result.
     value: Any
-    #: Error of the task.
     error: Exception | None
     #: Why the worker is unfit for any task of this run; empty if it is fit.
     refusal: str
-    #: Address of the worker, name of its machine.
+    #: Address of the worker, name of its machine, and processor time, s.
     worker: str
     host: str
-    #: Processor time.
     seconds: float
 
 

@@ -13,14 +13,15 @@ import secrets
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, InvalidStateError
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from itertools import count
+from operator import itemgetter
 from pathlib import Path
-from threading import Event, Lock, Thread, Timer
+from threading import Event, Thread, Timer
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -79,24 +80,28 @@ def connected_client(address: str) -> Iterator[Any]:
     """
     Yield a client of a cluster, which is started first if it is one of this machine.
 
-    Parameters
-    ----------
-    address : str
-        As :func:`per_obspy.config.engine.checked_address` returns it.
-
     Raises
     ------
     MissingExtra
         If Dask is not installed.
     ServiceError
-        If no scheduler answers there.
+        If no scheduler answers at the checked address.
     """
     require_extra("dask", "distributed")
     library = import_module("distributed")  # its classes have no complete types
     with ExitStack() as stack:
         place: Any = address
-        if local_workers(address) is not None:
-            place = stack.enter_context(_local_cluster(address))
+        if (workers := local_workers(address)) is not None:
+            # One process per worker, closed to other machines; faults are logged by the client
+            place = library.LocalCluster(
+                n_workers=workers or usable_processors(),
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(place)
         elif address.endswith(".json") and "://" not in address:
             place = _address_in(Path(address))
         try:
@@ -120,20 +125,6 @@ def _address_in(file: Path) -> str:
     if not isinstance(address, str) or "://" not in address:
         raise CatalogError(str(file), "no scheduler file: it has no address of a scheduler")
     return address
-
-
-def _local_cluster(address: str) -> Any:
-    """Return a cluster of this machine, one process per worker, closed to other machines."""
-    library = import_module("distributed")  # its classes have no complete types
-    # Faults of workers are logged once, by their client
-    return library.LocalCluster(
-        n_workers=local_workers(address) or usable_processors(),
-        threads_per_worker=1,
-        processes=True,
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-        silence_logs=logging.CRITICAL,
-    )
 
 
 def present_workers(client: Any) -> Mapping[str, tuple[str, int]]:
@@ -182,104 +173,95 @@ class ClusterWorker:
 
 class ClusterWorkers:
     """
-    Workers by address, with their events.
+    Workers by address, with their events; every fault is logged when it happens.
 
-    Every fault is logged with the worker's machine and address when it happens.
+    Threads of the executor and of Dask share it, so that loops go over copies.
     """
 
     def __init__(self) -> None:
-        self._lock = Lock()
         self._workers: dict[str, ClusterWorker] = {}
         self._events: list[dict[str, str]] = []
         self._left_out = 0
 
     def update(self, present: Mapping[str, tuple[str, int]]) -> set[str]:
         """Update the present workers, note those that disappeared, and return new addresses."""
-        with self._lock:
-            before = {address for address, one in self._workers.items() if one.threads}
-            for address, (host, threads) in present.items():
-                self._workers.setdefault(address, ClusterWorker(host)).threads = threads
-            for address in before - present.keys():
-                self._workers[address].threads = 0
-        # Logging may take its time
+        before = {address for address, one in self._copy() if one.threads}
+        for address, (host, threads) in present.items():
+            self._workers.setdefault(address, ClusterWorker(host)).threads = threads
+        # Workers that were there before
         for address in sorted(before - present.keys()):
+            self._workers[address].threads = 0
             self.note(address, "is gone: killed, preempted or cut off; its tasks are done again")
         return present.keys() - before
 
     def check(self, address: str, host: str, fault: str) -> None:
         """Set machine and fault of a worker; the same fault is noted once."""
-        with self._lock:
-            worker = self._workers.setdefault(address, ClusterWorker())
-            worker.host = host or worker.host
-            is_new = bool(fault) and worker.fault != fault
-            worker.fault = fault or worker.fault
-        if is_new:
+        worker = self._workers.setdefault(address, ClusterWorker())
+        worker.host = host or worker.host
+        if fault and worker.fault != fault:
+            worker.fault = fault
             self.note(address, f"{fault}; it gets no task")
 
     def add_task(self, address: str, host: str, seconds: float) -> None:
         """Count a finished task of a worker."""
-        with self._lock:
-            worker = self._workers.setdefault(address, ClusterWorker())
-            worker.host, worker.tasks = host, worker.tasks + 1
-            worker.seconds += seconds
+        worker = self._workers.setdefault(address, ClusterWorker())
+        worker.host, worker.tasks = host, worker.tasks + 1
+        worker.seconds += seconds
 
     def fit(self) -> dict[str, int]:
         """Return the fit workers that are present: address -> threads."""
-        with self._lock:
-            known = self._workers.items()
-            return {name: one.threads for name, one in known if one.threads and not one.fault}
+        return {name: one.threads for name, one in self._copy() if one.threads and not one.fault}
 
     def unfit(self) -> list[str]:
         """Return the workers that are present and unfit, each with its reason."""
-        with self._lock:
-            known = self._workers.items()
-            return [f"{w.host} ({name}) {w.fault}" for name, w in known if w.threads and w.fault]
+        present = [(name, one) for name, one in self._copy() if one.threads and one.fault]
+        return [f"{one.host} ({name}) {one.fault}" for name, one in present]
 
     def facts(self) -> dict[str, Any]:
         """Return every worker with its work, and all events, as plain values."""
-        with self._lock:
-            # Workers that are gone have done their part as well
-            workers = [
-                {"address": name, "host": w.host, "tasks": w.tasks, "seconds": round(w.seconds, 3)}
-                for name, w in sorted(self._workers.items())
-                if w.threads or w.tasks
-            ]
-            events = [*self._events]
-            return {"workers": workers, "events": events, "events_left_out": self._left_out}
+        # Workers that are gone have done their part as well
+        workers = [
+            {
+                "address": name,
+                "host": one.host,
+                "tasks": one.tasks,
+                "seconds": round(one.seconds, 3),
+            }
+            for name, one in sorted(self._copy(), key=itemgetter(0))
+            if one.threads or one.tasks
+        ]
+        events = [*self._events]
+        return {"workers": workers, "events": events, "events_left_out": self._left_out}
 
     def note(self, address: str, reason: str) -> None:
         """Keep and log one event."""
-        with self._lock:
-            host = self._workers.get(address, ClusterWorker()).host
-            at = datetime.now(UTC).isoformat(timespec="seconds")
-            event = {"at": at, "worker": address, "host": host, "reason": printable(reason)}
-            # A cluster may lose workers all day
-            if len(self._events) < EVENTS_KEPT:
-                self._events.append(event)
-            else:
-                self._left_out += 1
-        LOG.warning("worker %s (%s) %s", host, address, printable(reason))
+        host = self._workers.get(address, ClusterWorker()).host
+        at = datetime.now(UTC).isoformat(timespec="seconds")
+        event = {"at": at, "worker": address, "host": host, "reason": printable(reason)}
+        # A cluster may lose workers all day
+        if len(self._events) < EVENTS_KEPT:
+            self._events.append(event)
+        else:
+            self._left_out += 1
+        LOG.warning("worker %s (%s) %s", host, address, event["reason"])
+
+    def _copy(self) -> list[tuple[str, ClusterWorker]]:
+        """Return addresses and workers as they are now."""
+        return list(self._workers.items())
 
 
+@dataclass(eq=False)
 class _Sent:
     """A task that was submitted, and how often it was tried."""
 
-    def __init__(self, task: SentTask) -> None:
-        self.task = task
-        self.attempts = 0
-        self.refusals = 0
-        self.result: Future[Any] = Future()
+    task: SentTask
+    attempts: int = 0
+    refusals: int = 0
+    result: Future[Any] = field(default_factory=Future)
 
 
 class DaskExecutor(ElasticExecutor):
-    """
-    Executor of a Dask cluster, which is connected when the first run begins.
-
-    Parameters
-    ----------
-    address : str
-        As :func:`per_obspy.config.engine.checked_address` returns it.
-    """
+    """Executor of a Dask cluster at a checked address, connected when the first run begins."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -296,14 +278,9 @@ class DaskExecutor(ElasticExecutor):
     @contextmanager
     def sharing(self, folder: Path, engine: Engine) -> Iterator[None]:
         """
-        Share the output folder of a run with the workers while its tasks are done.
+        Share the output folder of a run, which is made if need be, while its tasks are done.
 
-        Parameters
-        ----------
-        folder : Path
-            Absolute; made if need be; workers see it under the same path.
-        engine : Engine
-            Retries and patience.
+        Its path is absolute, and the same for the workers.
 
         Raises
         ------
@@ -415,8 +392,7 @@ class DaskExecutor(ElasticExecutor):
         if not self._closed.is_set():
             self._broken = printable(reason)
             for sent in list(self._pending.values()):
-                with suppress(InvalidStateError):
-                    sent.result.set_exception(BrokenExecutor(self._broken))
+                _fail(sent, BrokenExecutor(self._broken))
 
     def _try(self, sent: _Sent) -> None:
         """Send a task to any fit worker."""
@@ -439,24 +415,35 @@ class DaskExecutor(ElasticExecutor):
             return
         if future.cancelled():
             self._break(f"the scheduler {self.address} is gone")
-            return
-        if error := future.exception():  # of the cluster itself: each worker that tried it died
+        elif error := future.exception():
+            # Of the cluster itself: each worker that tried it died
             self._try_again(sent, MachineFault(_reason(error)))
-            return
-        outcome = future.result()
+        elif future.result().refusal:
+            self._refuse(sent, future.result())
+        else:
+            self._settle(sent, future.result())
+
+    def _refuse(self, sent: _Sent, outcome: Outcome) -> None:
+        """Try a task again that a worker has refused, on another one if there is any."""
+        self.workers.check(outcome.worker, outcome.host, outcome.refusal)
+        # The fault is the worker's alone while there are others
+        if self.workers.fit() and sent.refusals < MOST_REFUSALS:
+            sent.refusals, sent.attempts = sent.refusals + 1, sent.attempts - 1
+        reason = f"{outcome.host} ({outcome.worker}) {outcome.refusal}"
+        self._try_again(sent, MachineFault(reason))
+
+    def _settle(self, sent: _Sent, outcome: Outcome) -> None:
+        """Pass on the result or the error of a task that a worker has done."""
         self.workers.add_task(outcome.worker, outcome.host, outcome.seconds)
-        if outcome.refusal:
-            self.workers.check(outcome.worker, outcome.host, outcome.refusal)
-            # The fault is the worker's alone while there are others
-            if self.workers.fit() and sent.refusals < MOST_REFUSALS:
-                sent.refusals, sent.attempts = sent.refusals + 1, sent.attempts - 1
-            reason = f"{outcome.host} ({outcome.worker}) {outcome.refusal}"
-            self._try_again(sent, MachineFault(reason))
-        elif isinstance(outcome.error, TryLater):
+        if isinstance(outcome.error, TryLater):
             self.workers.note(outcome.worker, f"failed at a task: {outcome.error}")
             self._try_again(sent, outcome.error)
+        elif outcome.error is not None:
+            _fail(sent, outcome.error)
         else:
-            _settle(sent.result, outcome)
+            # It may be cancelled meanwhile
+            with suppress(InvalidStateError):
+                sent.result.set_result(outcome.value)
 
     def _try_again(self, sent: _Sent, error: Exception) -> None:
         """Try a task once more, a little later, unless it was tried often enough."""
@@ -465,8 +452,7 @@ class DaskExecutor(ElasticExecutor):
             timer.daemon = True
             timer.start()
             return
-        with suppress(InvalidStateError):
-            sent.result.set_exception(error)
+        _fail(sent, error)
 
     def _forget(self, number: int) -> None:
         """Forget a task that is done, and remove its file."""
@@ -492,6 +478,12 @@ class DaskExecutor(ElasticExecutor):
                 self.workers.note(address, f"is still at work after {seconds:g} s")
 
 
+def _fail(sent: _Sent, error: Exception) -> None:
+    """Pass on the error of a task that is not done yet."""
+    with suppress(InvalidStateError):
+        sent.result.set_exception(error)
+
+
 def _reason(error: BaseException) -> str:
     """Return the reason for which the cluster could not do a task."""
     worker = getattr(getattr(error, "last_worker", None), "address", "")
@@ -499,56 +491,27 @@ def _reason(error: BaseException) -> str:
     return died if worker else f"{type(error).__name__}: {error}"
 
 
-def _settle(result: Future[Any], outcome: Outcome) -> None:
-    """Pass on the value or the error of a task."""
-    with suppress(InvalidStateError):
-        if outcome.error is not None:
-            result.set_exception(outcome.error)
-        else:
-            result.set_result(outcome.value)
-
-
-@contextmanager
-def dask_executor(address: str | None) -> Iterator[Executor | None]:
+def dask_executor(address: str | None) -> AbstractContextManager[Executor | None]:
     """
-    Yield the executor of a Dask cluster for one command; None without an address.
-
-    Parameters
-    ----------
-    address : str or None
-        ``local``, ``local:N``, ``PROTOCOL://HOST:PORT``, ``HOST:PORT``, or a scheduler file.
-
-    Yields
-    ------
-    Executor or None
-        For any function of the pipeline; the cluster is connected when there is work for it.
+    Return the executor of a Dask cluster, connected when there is work; None without an address.
 
     Raises
     ------
     CatalogError
-        If the address has none of these forms.
+        If the address has none of the forms ``local``, ``local:N``, ``PROTOCOL://HOST:PORT``,
+        ``HOST:PORT`` and scheduler file.
     MissingExtra
         If Dask is not installed.
     """
-    if address is None:
-        yield None
-        return
-    with DaskExecutor(_address(address)) as executor:
-        yield executor
+    return nullcontext() if address is None else DaskExecutor(_address(address))
 
 
 def on_cluster(settings: Run, address: str | None) -> Run:
     """
     Return settings whose every run connects to a Dask cluster by itself; unchanged without one.
 
-    A program of many runs outlives a scheduler that is started again.
-
-    Raises
-    ------
-    CatalogError
-        If the address has none of its forms.
-    MissingExtra
-        If Dask is not installed.
+    A program of many runs outlives a scheduler that is started again. Errors are those of
+    :func:`dask_executor`.
     """
     if address is None:
         return settings
@@ -568,16 +531,9 @@ def _address(address: str) -> str:
 @contextmanager
 def opened_executor(engine: Engine, workers: Workers, folder: Path) -> Iterator[Workers]:
     """
-    Yield the workers of a run while its folder is shared with them.
+    Yield the workers of a run, of the configured cluster if they have no executor.
 
-    Parameters
-    ----------
-    engine : Engine
-        Settings; its cluster is used if the workers have no executor.
-    workers : Workers
-        Where to work.
-    folder : Path
-        Of the results.
+    Workers of a cluster share the folder of the results meanwhile.
 
     Raises
     ------
@@ -586,22 +542,14 @@ def opened_executor(engine: Engine, workers: Workers, folder: Path) -> Iterator[
     TryLater
         If the cluster has no scheduler or no usable worker.
     """
-    if workers.executor is None and engine.dask is not None:
-        with (
-            dask_executor(engine.dask) as cluster,
-            opened_executor(engine, replace(workers, executor=cluster), folder) as used,
-        ):
-            yield used
-        return
-    sharing = getattr(workers.executor, "sharing", None)
-    if sharing is None:
-        yield workers
-        return
-    with sharing(folder.resolve(), engine):
+    with ExitStack() as stack:
+        if workers.executor is None and engine.dask is not None:
+            workers = replace(workers, executor=stack.enter_context(DaskExecutor(engine.dask)))
+        if isinstance(workers.executor, DaskExecutor):
+            stack.enter_context(workers.executor.sharing(folder.resolve(), engine))
         yield workers
 
 
 def engine_facts(executor: Executor | None) -> dict[str, Any] | None:
     """Return workers and events of a cluster for ``run.json``; None for other executors."""
-    facts = getattr(executor, "facts", None)
-    return facts() if facts else None
+    return executor.facts() if isinstance(executor, DaskExecutor) else None
