@@ -11,12 +11,11 @@ import pyarrow.parquet as pq
 from per_obspy.config import Run, Totals
 from per_obspy.inventory.schema import ROW_SUSPICIONS
 from per_obspy.report.files import outlines_beside
-from per_obspy.report.page.drawings import HISTORY_COLUMNS
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import ROWS, RankedTable, table_files
 from per_obspy.results.totals import PLACE
 from per_obspy.runs.stations import stations_of_earlier_run
-from per_obspy.runs.worst_pairs import HISTORIES, pair_histories, station_rows
+from per_obspy.runs.worst_pairs import HISTORIES, HISTORY_COLUMNS, pair_histories, station_rows
 
 #: Columns of a risk table that do not depend on the motion.
 OF_BUILDINGS = (
