@@ -6,7 +6,7 @@ Page, summary, figures, layers and workbook read one `Results` and nothing else.
 
 import csv
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -418,11 +418,23 @@ def with_page_data(results: Results, folder: Path, outlines: Path | None) -> Res
         rings = read_outlines(outlines, names.unique().tolist())
     return replace(
         results,
+        stations=with_radii(results.stations, results.drawings.radii),
         rejected=rejected,
         rejections=rejections,
         outlines=rings,
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
     )
+
+
+def with_radii(stations: pd.DataFrame, radii: Mapping[str, list[float]]) -> pd.DataFrame:
+    """Return stations with the PER and SD of those that have them."""
+    if stations.empty or not radii:
+        return stations
+    columns = {
+        column: stations["station"].map({name: pair[number] for name, pair in radii.items()})
+        for number, column in enumerate(("per", "sd"))
+    }
+    return stations.assign(**columns).astype(dict.fromkeys(columns, "float64"))
 
 
 def _column(table: pd.DataFrame, name: str) -> FloatArray:

@@ -22,7 +22,6 @@ from per_obspy.pounding.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
 from per_obspy.report.pair_figure import motion_along
 from per_obspy.report.results import Drawings
-from per_obspy.runs.run_facts import read_stations
 from per_obspy.runs.screening import shakemap_files
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import ground_files, read_ground, read_station_once
@@ -45,29 +44,14 @@ WORST, DOUBTFUL = 100, 50
 STATIONS = 40
 
 
-def station_rows(path: Path, stations: Sequence[FinishedStation]) -> pd.DataFrame:
-    """
-    Return the table of the stations with PER and SD of each at one period, cm.
-
-    Parameters
-    ----------
-    path : Path
-        ``stations.csv``, which need not exist.
-    stations : sequence of FinishedStation
-        With spectra.
-    """
-    table = read_stations(path)
-    if table.empty:
-        return table
-    # Largest of the horizontals
-    for name in ("per", "sd"):
-        values = {
-            station.station: _at_one_period(station.spectra, name)
-            for station in stations
-            if station.spectra is not None
-        }
-        table[name] = table["station"].map(values)
-    return table
+def _radii(stations: Sequence[FinishedStation]) -> dict[str, list[float]]:
+    """Return PER and SD of each station at one period, cm."""
+    radii = {
+        station.station: [_at_one_period(station.spectra, name) for name in ("per", "sd")]
+        for station in stations
+        if station.spectra is not None
+    }
+    return {name: pair for name, pair in radii.items() if np.isfinite(pair).all()}
 
 
 def _at_one_period(spectra: Any, name: str) -> float:
@@ -111,9 +95,9 @@ def page_drawings(
     stations : sequence of FinishedStation
         With station files.
     """
-    histories = pair_histories(worst, stations)
+    histories, radii = pair_histories(worst, stations), _radii(stations)
     if "probability" not in worst or "derived" not in worst:
-        return Drawings({}, histories)
+        return Drawings({}, histories, radii=radii)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
@@ -121,7 +105,7 @@ def page_drawings(
     ground, _ = ground_files(stations, shakemap_files(settings), settings.screening.interpolation)
     rows = _sensitivities(chosen, read_ground(ground), settings)
     counts = min(len(known), WORST), len(doubt)
-    return Drawings(_station_drawings(worst, stations), histories, rows, *counts)
+    return Drawings(_station_drawings(worst, stations), histories, rows, *counts, radii)
 
 
 def _sensitivities(
