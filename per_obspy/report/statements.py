@@ -22,6 +22,9 @@ LISTED = 10
 #: Names in a sentence, and the longest of them, characters.
 NAMED, LONGEST_NAME = 5, 40
 
+#: Kinds of reasons that a sentence names.
+NAMED_KINDS = 4
+
 #: Stations in a sentence, and the longest reason of one that is not used, characters.
 NAMED_STATIONS, LONGEST_REASON = 12, 90
 
@@ -296,93 +299,6 @@ def revision_line(revision: Revision, language: str) -> str:
     return f"{name}: {line}" if name else line
 
 
-def station_sentences(stations: pd.DataFrame, language: str) -> list[str]:
-    """Return a sentence on the expected stations, with the names of used and missing ones."""
-    if stations.empty or not {"station", "state"} <= set(stations):
-        return [LANGUAGES[language]["no_station"]]
-    # Whatever is not used serves no pair
-    is_used = (stations["state"] == "used").to_numpy()
-    parts = [counted(language, "stations_expected", len(stations))]
-    for key, chosen in (("used", stations[is_used]), ("missing", stations[~is_used])):
-        if len(chosen):
-            names = _station_names(chosen, language)
-            parts.append(f"{counted(language, f'stations_{key}', len(chosen))}: {names}")
-    return [f"{'; '.join(parts)}."]
-
-
-def _station_names(stations: pd.DataFrame, language: str) -> str:
-    """Return the names of the first stations, with the reasons of rejected ones."""
-    names = list[str]()
-    for _, station in stations.head(NAMED_STATIONS).iterrows():
-        name, reason = shortened(str(station["station"]), LONGEST_NAME), station.get("rejected")
-        if station["state"] != "used" and isinstance(reason, str) and reason:
-            name += f" ({shortened(fixed_phrases(reason, language), LONGEST_REASON)})"
-        names.append(name)
-    # Names of all of them are in the table of stations
-    others = len(stations) - len(names)
-    return ", ".join(names) + (f" {counted(language, 'and_more', others)}" if others else "")
-
-
-def made_sentence(results: Results) -> str:
-    """Return a sentence on the program and the table of all pairs."""
-    text = LANGUAGES[results.language]["made"]
-    return text.format(version=version("per_obspy"), table=results.stem)
-
-
-def pair_sentence(pair: Mapping[str, Any], language: str) -> str:
-    """Describe a listed pair in one sentence."""
-    texts, parts = LANGUAGES[language], [_headline(pair, "pair_id", language)]
-    # Values that are unknown are left out
-    speed = speed_text(number(pair, "expected_impact_velocity"), language)
-    parts.append(texts["impact"].format(speed=speed))
-    if math.isfinite(chance := number(pair, "probability")):
-        parts.append(texts["contact"].format(chance=chance_text(chance, language)))
-    return f"{', '.join(parts + _at(pair, language))}."
-
-
-def building_sentence(building: Mapping[str, Any], language: str) -> str:
-    """Describe a listed building in one sentence."""
-    speed = speed_text(number(building, "severity"), language)
-    severity = LANGUAGES[language]["severity"].format(speed=speed)
-    parts = [_headline(building, "building_id", language), severity, *_at(building, language)]
-    return f"{', '.join(parts)}."
-
-
-def _headline(row: Mapping[str, Any], name: str, language: str) -> str:
-    """Return name and class of a pair or building."""
-    return f"{name_text(row[name])}: {class_text(str(row['risk_class']), LANGUAGES[language])}"
-
-
-def _at(row: Mapping[str, Any], language: str) -> list[str]:
-    """Return the place of a pair or building, as a list that is empty where it is unknown."""
-    north, east = number(row, "latitude"), number(row, "longitude")
-    if not (math.isfinite(north) and math.isfinite(east)):
-        return []
-    return [LANGUAGES[language]["at"].format(place=place_text(north, east, 5, language))]
-
-
-def place_text(north: float, east: float, decimals: int, language: str = "en") -> str:
-    """
-    Return a place (degrees) with compass directions instead of signs, for the radio.
-
-    Examples
-    --------
-    >>> place_text(-0.07316, 0.3, 5)
-    '0.07316 south, 0.30000 east'
-    """
-    texts = LANGUAGES[language]
-    # Longitudes may go beyond 180 degrees
-    east = (east + 180.0) % 360.0 - 180.0
-    sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
-    return (
-        f"{abs(north):.{decimals}f} {texts[sides[0]]}, {abs(east):.{decimals}f} {texts[sides[1]]}"
-    )
-
-
-#: Kinds of reasons that a sentence names.
-NAMED_KINDS = 4
-
-
 def coverage_sentences(coverage: Coverage, language: str = "en") -> list[str]:
     """
     Return the coverage in sentences; the first one warns where a third or more has no verdict.
@@ -465,3 +381,86 @@ def _kind(kind: str, language: str) -> str:
     if colon and re.fullmatch(r"[a-z_]+", column):
         return f"{in_context('reason', column, language)}: {in_context('reason', fault, language)}"
     return in_context("reason", kind, language)
+
+
+def station_sentences(stations: pd.DataFrame, language: str) -> list[str]:
+    """Return a sentence on the expected stations, with the names of used and missing ones."""
+    if stations.empty or not {"station", "state"} <= set(stations):
+        return [LANGUAGES[language]["no_station"]]
+    # Whatever is not used serves no pair
+    is_used = (stations["state"] == "used").to_numpy()
+    parts = [counted(language, "stations_expected", len(stations))]
+    for key, chosen in (("used", stations[is_used]), ("missing", stations[~is_used])):
+        if len(chosen):
+            names = _station_names(chosen, language)
+            parts.append(f"{counted(language, f'stations_{key}', len(chosen))}: {names}")
+    return [f"{'; '.join(parts)}."]
+
+
+def _station_names(stations: pd.DataFrame, language: str) -> str:
+    """Return the names of the first stations, with the reasons of rejected ones."""
+    names = list[str]()
+    for _, station in stations.head(NAMED_STATIONS).iterrows():
+        name, reason = shortened(str(station["station"]), LONGEST_NAME), station.get("rejected")
+        if station["state"] != "used" and isinstance(reason, str) and reason:
+            name += f" ({shortened(fixed_phrases(reason, language), LONGEST_REASON)})"
+        names.append(name)
+    # Names of all of them are in the table of stations
+    others = len(stations) - len(names)
+    return ", ".join(names) + (f" {counted(language, 'and_more', others)}" if others else "")
+
+
+def made_sentence(results: Results) -> str:
+    """Return a sentence on the program and the table of all pairs."""
+    text = LANGUAGES[results.language]["made"]
+    return text.format(version=version("per_obspy"), table=results.stem)
+
+
+def pair_sentence(pair: Mapping[str, Any], language: str) -> str:
+    """Describe a listed pair in one sentence."""
+    texts, parts = LANGUAGES[language], [_headline(pair, "pair_id", language)]
+    # Values that are unknown are left out
+    speed = speed_text(number(pair, "expected_impact_velocity"), language)
+    parts.append(texts["impact"].format(speed=speed))
+    if math.isfinite(chance := number(pair, "probability")):
+        parts.append(texts["contact"].format(chance=chance_text(chance, language)))
+    return f"{', '.join(parts + _at(pair, language))}."
+
+
+def building_sentence(building: Mapping[str, Any], language: str) -> str:
+    """Describe a listed building in one sentence."""
+    speed = speed_text(number(building, "severity"), language)
+    severity = LANGUAGES[language]["severity"].format(speed=speed)
+    parts = [_headline(building, "building_id", language), severity, *_at(building, language)]
+    return f"{', '.join(parts)}."
+
+
+def _headline(row: Mapping[str, Any], name: str, language: str) -> str:
+    """Return name and class of a pair or building."""
+    return f"{name_text(row[name])}: {class_text(str(row['risk_class']), LANGUAGES[language])}"
+
+
+def _at(row: Mapping[str, Any], language: str) -> list[str]:
+    """Return the place of a pair or building, as a list that is empty where it is unknown."""
+    north, east = number(row, "latitude"), number(row, "longitude")
+    if not (math.isfinite(north) and math.isfinite(east)):
+        return []
+    return [LANGUAGES[language]["at"].format(place=place_text(north, east, 5, language))]
+
+
+def place_text(north: float, east: float, decimals: int, language: str = "en") -> str:
+    """
+    Return a place (degrees) with compass directions instead of signs, for the radio.
+
+    Examples
+    --------
+    >>> place_text(-0.07316, 0.3, 5)
+    '0.07316 south, 0.30000 east'
+    """
+    texts = LANGUAGES[language]
+    # Longitudes may go beyond 180 degrees
+    east = (east + 180.0) % 360.0 - 180.0
+    sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
+    return (
+        f"{abs(north):.{decimals}f} {texts[sides[0]]}, {abs(east):.{decimals}f} {texts[sides[1]]}"
+    )
