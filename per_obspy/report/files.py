@@ -6,7 +6,7 @@ Page, summary, figures, layers and workbook read one `Results` and nothing else.
 
 import csv
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -436,7 +436,10 @@ def with_page_data(
     if outlines is not None and "building_id_1" in worst:
         names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
         rings = read_outlines(outlines, names.unique().tolist())
-    placed = replace(results, rejected=rejected, rejections=rejections, outlines=rings)
+    stations = with_radii(results.stations, results.drawings.radii)
+    placed = replace(
+        results, stations=stations, rejected=rejected, rejections=rejections, outlines=rings
+    )
     # Pairs that the page has one by one, and those that it counts
     places = [worst, results.tally.cells.table()]
     if not {"longitude", "latitude"} <= set(worst):
@@ -469,6 +472,17 @@ def _with_map(
     source = ": ".join(filter(None, [printable(settings.background.name), credit]))
     provenance = [*results.provenance, (results.texts["background"], source)]
     return replace(results, lines=lines, provenance=provenance)
+
+
+def with_radii(stations: pd.DataFrame, radii: Mapping[str, list[float]]) -> pd.DataFrame:
+    """Return stations with the PER and SD of those that have them."""
+    if stations.empty or not radii:
+        return stations
+    columns = {
+        column: stations["station"].map({name: pair[number] for name, pair in radii.items()})
+        for number, column in enumerate(("per", "sd"))
+    }
+    return stations.assign(**columns).astype(dict.fromkeys(columns, "float64"))
 
 
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:

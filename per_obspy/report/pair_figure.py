@@ -147,6 +147,9 @@ def _draw_radii(axes: Axes, pair: pd.Series) -> None:
         # At contact height a radius is this times its participation
         axes.plot(pair[f"period_{i}"], pair[f"per_{i}"], "o", color=colour, label=text)
     axes.set(xlabel="natural period (s)", ylabel="pseudo energy radius (m)")
+    # Numbers as people write them; powers of ten are typeset as formulas, which takes longer
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
     axes.legend(fontsize=8, loc="lower right")
 
 

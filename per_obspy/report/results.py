@@ -70,6 +70,8 @@ class Drawings(NamedTuple):
         Rank -> input, both values, and probability and state at each of them.
     worst, doubtful : int
         Pairs whose sensitivity is computed: the worst, and those with a chance nearest to a half.
+    radii : mapping of str to list
+        Name -> PER and SD of a station at one period, cm.
     """
 
     stations: Mapping[str, dict[str, Any]] = {}
@@ -77,6 +79,7 @@ class Drawings(NamedTuple):
     sensitivity: Mapping[int, list[list[Any]]] = {}
     worst: int = 0
     doubtful: int = 0
+    radii: Mapping[str, list[float]] = {}
 
 
 @dataclass(frozen=True)

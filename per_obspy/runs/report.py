@@ -38,12 +38,12 @@ from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
 from per_obspy.runs.output_folder import WORST_PAIRS
 from per_obspy.runs.provenance import RunContext
-from per_obspy.runs.run_facts import event_of_run, revision_of_run
+from per_obspy.runs.run_facts import event_of_run, read_stations, revision_of_run
 from per_obspy.runs.scenario_runs import ScenarioRuns
 from per_obspy.runs.stations import file_stem, simulated_motion
 from per_obspy.runs.tasks.ground_files import read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
-from per_obspy.runs.worst_pairs import page_drawings, read_drawings, station_rows, write_drawings
+from per_obspy.runs.worst_pairs import page_drawings, read_drawings, write_drawings
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import pounding_state, risk_class
@@ -114,7 +114,7 @@ def _results_of_run(
     return Results(
         "risk", region, coverage, language, revision._replace(number=number),
         event_sentences(known, language),
-        stations=station_rows(folder / "stations.csv", stations),
+        stations=read_stations(folder / "stations.csv"),
         drawings=read_drawings(folder / WORST_PAIRS), provenance=_provenance(settings),
         class_limits=settings.screening.classes,
     )  # fmt: skip

@@ -10,13 +10,14 @@ import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
 from per_obspy.inventory.schema import ROW_SUSPICIONS
-from per_obspy.report.files import outlines_beside
-from per_obspy.report.page.drawings import HISTORY_COLUMNS
+from per_obspy.report.files import outlines_beside, with_radii
 from per_obspy.results.parts import batches, bounded_database, parquet_rows
 from per_obspy.results.ranked_table import ROWS, RankedTable, table_files
 from per_obspy.results.totals import PLACE
+from per_obspy.runs.output_folder import WORST_PAIRS
+from per_obspy.runs.run_facts import read_stations
 from per_obspy.runs.stations import stations_of_earlier_run
-from per_obspy.runs.worst_pairs import HISTORIES, pair_histories, station_rows
+from per_obspy.runs.worst_pairs import HISTORIES, HISTORY_COLUMNS, pair_histories, read_drawings
 
 #: Columns of a risk table that do not depend on the motion.
 OF_BUILDINGS = (
@@ -115,11 +116,11 @@ class ScenarioRuns:
 
     def stations(self) -> pd.DataFrame:
         """Return the stations of all runs, each with the name of its scenario."""
-        tables = [
-            table.assign(station=table["station"] + f" ({name})")
-            for name, run in self.runs.items()
-            if len(table := station_rows(run.folder / "stations.csv", _stations(run)))
-        ]
+        tables = list[pd.DataFrame]()
+        for name, run in self.runs.items():
+            if len(table := read_stations(run.folder / "stations.csv")):
+                table = with_radii(table, read_drawings(run.folder / WORST_PAIRS).radii)
+                tables.append(table.assign(station=table["station"] + f" ({name})"))
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
     def histories(self, ensemble: RankedTable) -> dict[int, dict[str, Any]]:

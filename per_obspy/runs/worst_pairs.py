@@ -12,18 +12,23 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Run
+from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.files import written_whole
-from per_obspy.report.page.drawings import HISTORY_COLUMNS, drawn_history, drawn_station
+from per_obspy.pounding.row_history import PoundingHistory, pounding_history
+from per_obspy.pounding.structure import Structure
+from per_obspy.report.pair_figure import motion_along
 from per_obspy.report.results import Drawings
-from per_obspy.runs.run_facts import read_stations
 from per_obspy.runs.screening import ground_of_run
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import read_ground, read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
+from per_obspy.screening.values import components
 
 #: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
 HISTORIES = 100
@@ -39,29 +44,14 @@ WORST, DOUBTFUL = 100, 50
 STATIONS = 40
 
 
-def station_rows(path: Path, stations: Sequence[FinishedStation]) -> pd.DataFrame:
-    """
-    Return the table of the stations with PER and SD of each at one period, cm.
-
-    Parameters
-    ----------
-    path : Path
-        ``stations.csv``, which need not exist.
-    stations : sequence of FinishedStation
-        With spectra.
-    """
-    table = read_stations(path)
-    if table.empty:
-        return table
-    # Largest of the horizontals
-    for name in ("per", "sd"):
-        values = {
-            station.station: _at_one_period(station.spectra, name)
-            for station in stations
-            if station.spectra is not None
-        }
-        table[name] = table["station"].map(values)
-    return table
+def _radii(stations: Sequence[FinishedStation]) -> dict[str, list[float]]:
+    """Return PER and SD of each station at one period, cm."""
+    radii = {
+        station.station: [_at_one_period(station.spectra, name) for name in ("per", "sd")]
+        for station in stations
+        if station.spectra is not None
+    }
+    return {name: pair for name, pair in radii.items() if np.isfinite(pair).all()}
 
 
 def _at_one_period(spectra: Any, name: str) -> float:
@@ -70,37 +60,6 @@ def _at_one_period(spectra: Any, name: str) -> float:
     values = chosen.sel(period=SHOWN_PERIOD, method="nearest").to_numpy()
     horizontals = values[: int(spectra.attrs.get("horizontals", values.size))]
     return 100.0 * float(np.nanmax(horizontals)) if horizontals.size else math.nan
-
-
-def pair_histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> dict[int, dict[str, Any]]:
-    """
-    Return the histories of the worst pairs with a gap and a record, by their rank.
-
-    Parameters
-    ----------
-    worst : DataFrame
-        Rows of a risk table, worst first.
-    stations : iterable of FinishedStation
-        With station files.
-    """
-    if not set(HISTORY_COLUMNS) <= set(worst):
-        return {}
-    usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
-    shards = {station.shard.stem: station for station in stations if station.shard}
-    histories = {}
-    # Station by station, because motions are large
-    for name, pairs in usable.groupby("station", sort=False):
-        station = shards.get(file_stem(str(name)))
-        if station is None or station.shard is None:
-            continue
-        motion = read_station_once(station.shard, station.hash)
-        for _, pair in pairs.iterrows():
-            history = drawn_history(motion, pair)
-            if history is not None:
-                histories[int(pair["rank"])] = history
-    return histories
 
 
 def write_drawings(drawings: Drawings, path: Path) -> None:
@@ -136,9 +95,9 @@ def page_drawings(
     stations : sequence of FinishedStation
         With station files.
     """
-    histories = pair_histories(worst, stations)
+    histories, radii = pair_histories(worst, stations), _radii(stations)
     if "probability" not in worst or "derived" not in worst:
-        return Drawings({}, histories)
+        return Drawings({}, histories, radii=radii)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
@@ -146,7 +105,7 @@ def page_drawings(
     ground, _ = ground_of_run(settings, stations)
     rows = _sensitivities(chosen, read_ground(ground), settings)
     counts = min(len(known), WORST), len(doubt)
-    return Drawings(_station_drawings(worst, stations), histories, rows, *counts)
+    return Drawings(_station_drawings(worst, stations), histories, rows, *counts, radii)
 
 
 def _sensitivities(
@@ -179,6 +138,154 @@ def _each(pairs: pd.DataFrame, ground: RegionalMotion, settings: Run) -> list[An
     return [one for half in halves for one in _each(half, ground, settings)]
 
 
+#: Intervals of time in a drawing, each with the smallest and the largest value in it.
+INTERVALS = 300
+
+#: Impacts that are drawn, the fastest ones.
+MOST_IMPACTS = 300
+
+#: Columns of the risk table that a history needs.
+HISTORY_COLUMNS = (
+    "rank", "station", "gap", "restitution", "azimuth_used", "period_1", "period_2", "damping_1",
+    "damping_2", "participation_1", "participation_2", "contact_mass_1", "contact_mass_2",
+    "yield_displacement_1", "yield_displacement_2", "hardening_1", "hardening_2",
+)  # fmt: skip
+
+#: Longest record of which a history is drawn, samples: longer ones take too long.
+MOST_SAMPLES = 200_000
+
+
+def pair_histories(
+    worst: pd.DataFrame, stations: Iterable[FinishedStation]
+) -> dict[int, dict[str, Any]]:
+    """
+    Return the histories of the worst pairs with a gap and a record, by their rank.
+
+    Parameters
+    ----------
+    worst : DataFrame
+        Rows of a risk table, worst first.
+    stations : iterable of FinishedStation
+        With station files.
+    """
+    if not set(HISTORY_COLUMNS) <= set(worst):
+        return {}
+    usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
+    shards = {station.shard.stem: station for station in stations if station.shard}
+    histories = {}
+    # Station by station, because motions are large
+    for name, pairs in usable.groupby("station", sort=False):
+        station = shards.get(file_stem(str(name)))
+        if station is None or station.shard is None:
+            continue
+        motion = read_station_once(station.shard, station.hash)
+        for _, pair in pairs.iterrows():
+            history = drawn_history(motion, pair)
+            if history is not None:
+                histories[int(pair["rank"])] = history
+    return histories
+
+
+def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:
+    """
+    Return the exact history of a pair at contact level for a drawing, None if there is none.
+
+    Parameters
+    ----------
+    station : Dataset
+        With the acceleration of the record that the pair used.
+    pair : Series
+        Row of the risk table.
+
+    Returns
+    -------
+    dict or None
+        ``time`` (s, of the drawn intervals), ``one`` and ``two`` (displacements as smallest and
+        largest per interval, mm), ``impacts`` (time in s and approach velocity in m/s).
+    """
+    azimuth, gap = float(pair["azimuth_used"]), float(pair["gap"])
+    if not math.isfinite(gap) or station.sizes["time"] > MOST_SAMPLES:
+        return None
+    motion = motion_along(station, azimuth)
+    try:
+        structures = [_structure(pair, 1), _structure(pair, 2)]
+        history = pounding_history(
+            motion,
+            float(station["sampling_interval"]),
+            structures,
+            gap,
+            float(pair["restitution"]),
+            free_vibration=False,
+        )
+    except ValueError:
+        # A structure outside the range of the exact history has none
+        return None
+    return _thinned(history)
+
+
+def _structure(pair: pd.Series, number: int) -> Structure:
+    """Return a building of the pair as an oscillator at contact level."""
+    # Yielding is known of the oscillator, the history is at contact level
+    share = float(pair[f"participation_{number}"])
+    limit = float(pair[f"yield_displacement_{number}"])
+    return Structure(
+        period=float(pair[f"period_{number}"]),
+        damping=float(pair[f"damping_{number}"]),
+        mass=float(pair[f"contact_mass_{number}"]),
+        yield_displacement=share * limit if math.isfinite(limit) else math.inf,
+        hardening=float(pair[f"hardening_{number}"]) if math.isfinite(limit) else 0.0,
+        participation=share,
+    )
+
+
+def _thinned(history: PoundingHistory) -> dict[str, Any]:
+    """Return the strong motion of a history, thinned."""
+    strength = np.cumsum((history.displacement**2).sum(axis=0))
+    # All of it without any motion
+    shares = np.array([0.002, 0.995]) if strength[-1] > 0 else np.array([0.0, 1.0])
+    first, last = np.searchsorted(strength, shares * strength[-1])
+    edges = np.unique(np.linspace(first, max(last, first + 1), INTERVALS + 1).astype(int))
+    return {
+        "time": [round(float(time), 3) for time in history.time[edges]],
+        "one": _displacements(history.displacement[0], edges),
+        "two": _displacements(history.displacement[1], edges),
+        "impacts": _fastest(history.impacts),
+    }
+
+
+def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
+    """Return time, s, and approach velocity, m/s, of the fastest impacts that count."""
+    time, counted, one, two = (
+        impacts[name].to_numpy()
+        for name in ("time", "counted", "velocity_before_1", "velocity_before_2")
+    )
+    speed = one - two
+    order = np.argsort(-speed, kind="stable")
+    fastest = order[counted[order]][:MOST_IMPACTS]
+    rows: list[list[float]] = np.stack([time[fastest], speed[fastest]], axis=1).round(3).tolist()
+    return rows
+
+
+def _displacements(displacement: FloatArray, edges: Any) -> list[float]:
+    """Return the smallest and the largest displacement between edges, mm."""
+    envelope = _envelope(1000.0 * displacement[: edges[-1] + 1], edges)
+    return [round(float(value), 1) for value in envelope]
+
+
+def _envelope(values: FloatArray, edges: Any) -> FloatArray:
+    """Return the smallest and the largest value between edges by turns."""
+    smallest = np.minimum.reduceat(values, edges[:-1])
+    largest = np.maximum.reduceat(values, edges[:-1])
+    return np.stack([smallest, largest], axis=1).ravel()
+
+
+#: Digits of the numbers.
+DIGITS = 3
+
+#: Share of the energy of a record before and after its drawn part.
+QUIET = 0.001
+
+
 def _station_drawings(
     worst: pd.DataFrame, stations: Sequence[FinishedStation]
 ) -> dict[str, dict[str, Any]]:
@@ -193,3 +300,65 @@ def _station_drawings(
         for one in able[:STATIONS]
         if one.shard is not None
     }
+
+
+def drawn_station(station: xr.Dataset) -> dict[str, Any]:
+    """
+    Return record and spectra of a station for a drawing.
+
+    Parameters
+    ----------
+    station : Dataset
+        With its processed acceleration.
+
+    Returns
+    -------
+    dict
+        ``start, step`` (s), ``north, east`` (smallest and largest acceleration per interval, m/s²;
+        ``east`` is empty where there is one horizontal), ``period`` (s), ``per, sd`` (cm, of the
+        larger horizontal), ``damping`` and ``usable`` (shortest and longest period, s).
+    """
+    north, east, interval = components(station)
+    edges = _edges(north**2 + east**2)
+    # Spectra of the horizontals, at the damping of all records
+    count = int(station.attrs["horizontals"])
+    near = station.sel(damping=REFERENCE_DAMPING, method="nearest")
+    # Pads at both ends are left out
+    return {
+        "start": _rounded(interval * edges[0]),
+        "step": _rounded(interval * (edges[-1] - edges[0]) / (len(edges) - 1)),
+        "north": _samples(north, edges),
+        "east": _samples(east, edges) if count > 1 else [],
+        "period": _all_rounded(station["period"].to_numpy()),
+        "per": _all_rounded(100.0 * near["per"].to_numpy()[:count].max(axis=0)),
+        "sd": _all_rounded(100.0 * near["sd"].to_numpy()[:count].max(axis=0)),
+        "damping": float(near["damping"]),
+        "usable": [
+            _rounded(float(station[f"{end}_usable_period"])) for end in ("shortest", "longest")
+        ],
+    }
+
+
+def _edges(squared: FloatArray) -> Any:
+    """Return the first samples of the intervals, and the end of the last one."""
+    energy = np.cumsum(squared)
+    # All of a record at rest
+    shares = np.array([QUIET, 1.0 - QUIET]) if energy[-1] > 0.0 else np.array([0.0, 1.0])
+    first, last = np.searchsorted(energy, shares * energy[-1])
+    end = min(max(int(last), int(first) + 1) + 1, squared.size)
+    return np.unique(np.linspace(first, end, INTERVALS + 1).astype(int))
+
+
+def _samples(samples: FloatArray, edges: Any) -> list[float | None]:
+    """Return the smallest and the largest sample between edges."""
+    return _all_rounded(_envelope(samples[: edges[-1]], edges))
+
+
+def _all_rounded(values: FloatArray) -> list[float | None]:
+    """Return numbers with few digits, None where they are not finite."""
+    return [_rounded(float(value)) for value in values]
+
+
+def _rounded(value: float) -> float | None:
+    """Return a number with few digits, None where it is not finite."""
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None

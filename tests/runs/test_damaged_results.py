@@ -45,6 +45,7 @@ FILES = (
     "chunks/000000.json",
     "figures/overview.png",
     "figures/worst_pair.png",
+    "worst_pairs.json",
 )
 
 

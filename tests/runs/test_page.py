@@ -1,8 +1,7 @@
 """
 The page of a run, from its results.
 
-Tests of per_obspy.runs.report, per_obspy.runs.worst_pairs and
-per_obspy.report.page.drawings.
+Tests of per_obspy.runs.report and per_obspy.runs.worst_pairs.
 """
 
 import json

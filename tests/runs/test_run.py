@@ -72,6 +72,7 @@ def test_every_result_is_there(finished):
         "summary.txt",
         "figures/overview.png",
         "figures/worst_pair.png",
+        "worst_pairs.json",
     }
     assert set(result.record["outputs"]) == expected
     assert all((result.folder / name).stat().st_size for name in expected)

@@ -11,7 +11,6 @@ from matplotlib.text import Text
 
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
-from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.overview import draw_map
 from per_obspy.report.results import Results
 from per_obspy.report.statements import (
@@ -19,6 +18,7 @@ from per_obspy.report.statements import (
     Alert,
     alert,
     class_text,
+    coverage_sentences,
     first_steps,
     made_sentence,
     revision_line,
@@ -32,6 +32,9 @@ from per_obspy.report.words import chance_text, length_text, number, speed_text
 PAGE = (8.27, 11.69)
 LEFT, RIGHT = 0.07, 0.93
 LINE, LEGEND_LINE = 0.0148, 0.013
+
+#: Pairs of a map whose marks are shapes; those of more are one picture of so many dots per inch.
+MOST_SHAPES, PICTURE_DOTS = 3_000, 200
 
 #: Left edge of the map and its legend.
 MAP_LEFT = 0.56
@@ -77,7 +80,7 @@ def write_page(results: Results, path: Path) -> None:
     )
     # The same page has the same bytes
     with written_whole(path) as part:
-        figure.savefig(part, metadata={"CreationDate": None})
+        figure.savefig(part, metadata={"CreationDate": None}, dpi=PICTURE_DOTS)
 
 
 def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
@@ -86,6 +89,9 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     box = (MAP_LEFT, bottom + 0.05 + legend, RIGHT - MAP_LEFT, 0.225 - legend)
     axes, texts = figure.add_axes(box), results.texts
     draw_map(axes, results.shown, results.region, results.language, around_pairs=True)
+    # Marks of many pairs as one picture: each of them as a shape takes longer than all the rest
+    for marks in axes.collections if len(results.shown) > MOST_SHAPES else ():
+        marks.set_rasterized(True)
     # Labels in the language of the summary
     axes.set_title(results.counted("map_title", len(results.shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])

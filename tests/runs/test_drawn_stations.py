@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from per_obspy.report.page.drawings import INTERVALS, drawn_station
+from per_obspy.runs.worst_pairs import INTERVALS, drawn_station
 
 
 def station(north, east=None, interval=0.01):
