@@ -46,7 +46,7 @@ from per_obspy.pounding.row_tables import (
     run_in_parts,
     some_buildings,
 )
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima
 from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]

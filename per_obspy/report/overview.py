@@ -28,7 +28,7 @@ from per_obspy.report.style import (
     save,
     title_name,
 )
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS
 
 IntArray = NDArray[np.int64]
 

@@ -29,7 +29,7 @@ from per_obspy.screening.flags import (
 )
 from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.ranking import KEYS, state_columns, worst_first
+from per_obspy.screening.ranking import KEYS, kept_apart, state_columns, without_gap, worst_first
 from per_obspy.screening.shakemap import shakemap_rows
 from per_obspy.screening.site_motion import (
     RegionalMotion,
@@ -45,7 +45,6 @@ from per_obspy.screening.station_motion import (
     motion_of_one_horizontal,
     station_motion,
 )
-from per_obspy.screening.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import Columns, IndexArray, at_contact, chosen, joined, values
 from per_obspy.spectra.station import lacks_azimuths
 

@@ -19,9 +19,9 @@ from per_obspy.screening.population import (
     median_gap,
     one_wall_chance,
 )
+from per_obspy.screening.ranking import kept_apart
 from per_obspy.screening.risk import risk_rows
 from per_obspy.screening.site_motion import RegionalMotion
-from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
