@@ -354,7 +354,6 @@ def _maxima(
     free_vibration: bool,
     with_pairs: bool,
 ) -> tuple[RowMaxima, RowMaxima]:
-    """Return the maxima of rows and of pairs alone, where these are computed."""
     # The ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
@@ -374,7 +373,6 @@ def _maxima(
 
 
 def _row_maxima(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
-    """Return maxima by their names."""
     displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
     return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
 
@@ -408,7 +406,6 @@ def _run(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 def _run_part(
     ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 ) -> FloatArray:
-    """Return the maxima of some rows."""
     scales = row_scales(rows)
     lines = _lines_at_rest(rows, scales)
     counts = _run_lines(ground, dt, rows, scales, lines, free_vibration)

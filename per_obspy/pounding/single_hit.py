@@ -314,7 +314,6 @@ def single_hit(
 
 
 def _estimate(arguments: FloatArray, shape: tuple[int, ...]) -> SingleHit:
-    """Return the kernel's estimates by name, in the shape of the arguments."""
     status, fields, envelope = _run(arguments)
     status = status.reshape(shape)
     branches = SingleHitBranches(*(field.reshape(2, *shape) for field in np.moveaxis(fields, 1, 0)))

@@ -280,12 +280,10 @@ def _elastic_columns(table: Table) -> Columns:
 
 
 def _elastic_ductility(table: Table, i: int) -> FloatArray:
-    """Return the elastic over the yield displacement of building i."""
     return values(table, f"sd_{i}") / values(table, f"yield_displacement_{i}")
 
 
 def _yielding_columns(station: StationMotion, table: Table) -> Columns:
-    """Return the columns of pairs in which a building yields."""
     row = nearest_azimuth(station, table)
     first, second = (_equivalent(station, row, table, i) for i in (1, 2))
     # eq. (16) of the equivalent buildings; in narrow motion at most the elastic one

@@ -112,7 +112,6 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
 def _rows_at_stations(
     pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening
 ) -> pd.DataFrame:
-    """Return the rows of pairs that have a station."""
     index = pairs["station_index"].to_numpy(np.int64)
     if ground.field is not None:
         pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, index))
@@ -260,7 +259,6 @@ def risk_table(
 
 
 def _datasets(spectra: object) -> list[xr.Dataset]:
-    """Return the stations as a list."""
     expected = "a Dataset from station_spectra, or a sequence of such"
     if isinstance(spectra, xr.Dataset):
         return [spectra]

@@ -149,7 +149,6 @@ def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFrame:
-    """Return a pair table in which one input is certain."""
     changed = given.assign(**{name: value})
     if name == "period_correlation":
         return changed
@@ -157,7 +156,6 @@ def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFra
 
 
 def _deviation(name: str) -> str:
-    """Return the column of the log-standard deviation of an input of a building."""
     return f"{name.split('_')[0]}_log_std_{name[-1]}"
 
 

@@ -55,7 +55,6 @@ BOTH = np.stack([PULSE, PULSE])
 
 
 def _histories() -> None:
-    """Compile the kernels of histories of pairs, of rows, and of the single one of the page."""
     oscillators = [0.5], 0.05, 1.0, [0.7], 0.05, 1.0
     pounding_histories(BOTH, INTERVAL, *oscillators, 0.001, 0.65, azimuth=[0.0])
     structures = [Structure(0.5, 0.05, 1.0), Structure(0.7, 0.05, 1.0)]
