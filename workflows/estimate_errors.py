@@ -53,7 +53,7 @@ RATIOS = np.array([1.01, 1.02, 1.05, 1.1, 1.2, 1.35, 1.5, 1.7, 2.0, 2.5, 3.0, 4.
 DAMPINGS = ((0.05, 0.05), (0.02, 0.02), (0.1, 0.1), (0.03, 0.08), (0.08, 0.03))
 
 #: Lines between which the page is written by this workflow.
-START, END = "<!-- below: workflows/estimate_errors.py -->", "## Measured"
+START, END = "<!-- below: workflows/estimate_errors.py -->", "## Contact law"
 
 
 #: Pairs of a station with histories, their gaps over the demand, and constants of the kernel
