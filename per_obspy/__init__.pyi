@@ -22,8 +22,6 @@ from .pounding.critical_gap import absolute_gap as absolute_gap
 from .pounding.critical_gap import critical_gap as critical_gap
 from .pounding.critical_gap import srss_gap as srss_gap
 from .pounding.equivalent_linear import equivalent_linear as equivalent_linear
-from .pounding.impact import post_impact_velocities as post_impact_velocities
-from .pounding.impact import transfer_energies as transfer_energies
 from .pounding.linearization import davenport_peak_factor as davenport_peak_factor
 from .pounding.linearization import ductility_correlation as ductility_correlation
 from .pounding.linearization import linearized_correlation as linearized_correlation
@@ -35,7 +33,9 @@ from .pounding.probability import period_dispersion as period_dispersion
 from .pounding.probability import pounding_probability as pounding_probability
 from .pounding.relative import relative_displacement as relative_displacement
 from .pounding.row_history import pounding_history as pounding_history
+from .pounding.single_hit import post_impact_velocities as post_impact_velocities
 from .pounding.single_hit import single_hit as single_hit
+from .pounding.single_hit import transfer_energies as transfer_energies
 from .pounding.stationary_ground import CloughPenzien as CloughPenzien
 from .pounding.stationary_ground import KanaiTajimi as KanaiTajimi
 from .pounding.stationary_ground import WhiteNoise as WhiteNoise

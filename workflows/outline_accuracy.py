@@ -5,7 +5,9 @@ Compare drawn gaps with what surveyors saw in the street, in two quarters (secon
 
 Surveyors noted whether a building touches its neighbours to the left and to the right. Where both
 buildings of a pair inside its row touch on both sides, they touch each other, so that the gap of
-their outlines is the error of the drawing. Writes the table of ``docs/inventories.md``.
+their outlines is the error of the drawing. They noted the structural system too: how often touching
+neighbours have one is the chance of ``per_obspy/inventory/periods.py``. Writes both tables of
+``docs/inventories.md``.
 """
 
 import argparse
@@ -25,10 +27,15 @@ QUARTERS, BINS = ("san_jose", "guatemala"), (0.0, 0.1, 0.3, 0.5, 1.0, 3.0)
 START, END = "<!-- below: workflows/outline_accuracy.py -->", "<!-- above -->"
 
 
+def all_pairs(quarter: str) -> pd.DataFrame:
+    """Return the pairs of a quarter."""
+    folder = data_folder() / "inventories" / "footprints"
+    return pairs_from_footprints(folder / f"{quarter}_pilot_region_all_fields.gpkg")
+
+
 def surveyed_pairs(quarter: str) -> tuple[pd.DataFrame, pd.Series]:
     """Return pairs of surveyed buildings, and which touch on both sides of both buildings."""
-    folder = data_folder() / "inventories" / "footprints"
-    pairs = pairs_from_footprints(folder / f"{quarter}_pilot_region_all_fields.gpkg")
+    pairs = all_pairs(quarter)
     answers = pairs[[f"touches_{side}_{i}" for side in ("left", "right") for i in (1, 2)]]
     known = answers.astype(str).isin(("True", "False")).all(axis=1)
     return pairs[known], (answers[known].astype(str) == "True").all(axis=1)
@@ -55,6 +62,24 @@ def page() -> Iterator[str]:
         pairs, touch = surveyed_pairs(quarter)
         cells += [f"{touch[pairs['gap'] == 0.0].mean():.0%}"]
         yield f"| {quarter} | {' | '.join(cells)} |"
+    yield ""
+    yield "| quarter | touching pairs of equal storeys, of one system | of others | any two |"
+    yield "|---|---|---|---|"
+    for quarter in QUARTERS:
+        yield f"| {quarter} | {' | '.join(one_system(quarter))} |"
+
+
+def one_system(quarter: str) -> Iterator[str]:
+    """Yield shares of pairs whose buildings have one structural system by the survey."""
+    pairs = all_pairs(quarter)
+    systems = pairs[["structural_system_1", "structural_system_2"]].replace("", np.nan)
+    known = systems.notna().all(axis=1) & (pairs["gap"] == 0.0)
+    is_one = systems["structural_system_1"] == systems["structural_system_2"]
+    is_equal = pairs["storeys_1"] == pairs["storeys_2"]
+    for some in (known & is_equal, known & ~is_equal):
+        yield f"{some.sum()}, {is_one[some].mean():.0%}"
+    # independent of each other
+    yield f"{(systems.stack().value_counts(normalize=True) ** 2).sum():.0%}"
 
 
 def main() -> None:

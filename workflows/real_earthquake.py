@@ -120,7 +120,7 @@ CONCLUSIONS = """\
 * **How hard.** {worst} pairs are `severe` or `high`; {low} are `low`, below 0.05 m/s.
   Touching is not harm. The worst expected impact velocity is {velocity} m/s.
 * **How sure.** The state `yes` has {sure} of them. The others depend on an assumption: outlines
-  are drawn, so that half of those that touch count as one wall, and each gap is uncertain by
+  are drawn, so that 85 in 100 that touch count as one wall, and each gap is uncertain by
   0.1 m. All periods are derived from storeys. The nearest station is {station}, {near} km away,
   and the ground of the houses is unknown. Buildings are elastic here.
 * **What first.** Go to {first}:

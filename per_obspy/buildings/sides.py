@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy.buildings.columns import BUILDING_FLAGS, COMPASS, FLAGS
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.screening.ranking import risk_class
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS, risk_class
 from per_obspy.screening.values import values
 
 #: Columns of the risk table that a side of a building needs, besides those of its interface.

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
-from per_obspy.pounding.impact import mass_shares
-from per_obspy.pounding.single_hit import amplification_target, single_hit
+from per_obspy.pounding.single_hit import amplification_target, mass_shares, single_hit
 
 #: The stereomechanical picture (an instant impact) holds for contacts up to this share of the
 #: shortest period

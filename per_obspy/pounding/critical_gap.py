@@ -110,5 +110,4 @@ def absolute_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
 
 
 def _radii(per_1: ArrayLike, per_2: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return checked radii of both structures, m."""
     return checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)

@@ -87,7 +87,6 @@ def _estimate(
 
 
 def _failed() -> LinearizedEstimate:
-    """Return an estimate without numbers."""
     period, damping, sigma = np.full((3, 2), np.nan)
     return LinearizedEstimate(math.nan, period, damping, sigma, converged=False)
 
@@ -235,7 +234,6 @@ def _elastic_response(
 
 
 def _of_each(covariance: FloatArray, systems: list[FloatArray]) -> list[FloatArray]:
-    """Return the covariance of the states of each structure."""
     second, end = len(systems[0]), len(systems[0]) + len(systems[1])
     return [covariance[:second, :second], covariance[second:end, second:end]]
 
@@ -508,7 +506,6 @@ def _bandwidth(frequency: FloatArray, density: FloatArray) -> float:
 
 
 def _damped(first: Structure, second: Structure) -> tuple[Structure, Structure]:
-    """Return structures whose dampings are above 0."""
     for structure in (first, second):
         checks.number("damping", structure.damping, checks.positive)
     return first, second

@@ -255,7 +255,6 @@ def _history(
     motion: FloatArray,
     work: FloatArray,
 ) -> PoundingHistory:
-    """Return motion, impacts, maxima and energies by name."""
     displacement, velocity, plastic = motion.T.copy()
 
     # Energy balance (3), (4)

@@ -46,7 +46,7 @@ from per_obspy.pounding.row_tables import (
     run_in_parts,
     some_buildings,
 )
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima
 from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]
@@ -359,7 +359,6 @@ def _maxima(
     free_vibration: bool,
     with_pairs: bool,
 ) -> tuple[RowMaxima, RowMaxima]:
-    """Return the maxima of rows and of pairs alone, where these are computed."""
     # The ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
@@ -379,7 +378,6 @@ def _maxima(
 
 
 def _row_maxima(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
-    """Return maxima by their names."""
     displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
     return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
 
@@ -413,7 +411,6 @@ def _run(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 def _run_part(
     ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 ) -> FloatArray:
-    """Return the maxima of some rows."""
     scales = row_scales(rows)
     lines = _lines_at_rest(rows, scales)
     counts = _run_lines(ground, dt, rows, scales, lines, free_vibration)

@@ -186,7 +186,6 @@ class CloughPenzien:
 
 
 def _check_positive(ground: WhiteNoise | KanaiTajimi | CloughPenzien) -> None:
-    """Refuse parameters that are not positive."""
     for field in fields(ground):
         checks.number(field.name, getattr(ground, field.name), checks.positive)
 
@@ -241,7 +240,6 @@ def ground_correlation(
 
 
 def _number(name: str, value: ArrayLike) -> float:
-    """Return a checked period or damping above zero."""
     limit = checks.fraction_of_critical if name.startswith("damping") else checks.positive
     return checks.number(name, checks.number(name, value, limit), checks.positive)
 

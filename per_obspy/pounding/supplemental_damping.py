@@ -118,7 +118,6 @@ def supplemental_damping(
 def _checked(
     number: int, period: float, damping: float, share: float
 ) -> tuple[float, float, float]:
-    """Return the checked numbers of structure 1 or 2."""
     return (
         checks.number(f"period_{number}", period, checks.positive),
         checks.number(f"damping_{number}", damping, checks.fraction_of_critical),
@@ -127,7 +126,6 @@ def _checked(
 
 
 def _refuse_critical(name: str, damping: float) -> None:
-    """Refuse a largest damping that is not below critical."""
     if damping >= 1.0:
         raise ValueError(f"largest adds up to a {name} of {damping:.3g}, not below critical")
 

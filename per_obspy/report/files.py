@@ -55,7 +55,7 @@ from per_obspy.results.totals import (
     write_totals,
 )
 from per_obspy.screening.columns import column_table, known_column
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS
 
 #: Pairs that a figure shows, evenly from all of them: marks of more would cover each other.
 SHOWN = 20_000

@@ -30,7 +30,7 @@ from per_obspy.report.style import (
     title_name,
 )
 from per_obspy.report.texts import LANGUAGES, counted, written
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS
 
 IntArray = NDArray[np.int64]
 

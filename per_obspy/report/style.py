@@ -9,7 +9,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS
 
 #: Colours of severity, the worst first. Dark red to pale orange for what is to be inspected, blue
 #: for the mildest class: no class is green, because none is a promise of safety. Neighbours differ

@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_CLASS
 
 #: Largest number of cells; where there would be more, cells become twice as large.
 MOST_CELLS = 10_000

@@ -9,8 +9,7 @@ from per_obspy.errors import shortened
 from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
-from per_obspy.screening.ranking import UNKNOWN_STATE
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS, UNKNOWN_STATE
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -209,7 +209,6 @@ def _one_property(pairs: pd.DataFrame) -> BoolArray:
 
 
 def _aligned(pairs: pd.DataFrame, codes: Codes) -> BoolArray:
-    """Return a mask of pairs whose floors are known to be at one level."""
     return np.abs(values(pairs, "floor_offset")) <= codes.floor_tolerance
 
 

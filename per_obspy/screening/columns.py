@@ -12,22 +12,18 @@ from per_obspy.screening.meanings import FLAGS
 
 
 def _number(name: str, unit: str, meaning: str) -> Column:
-    """Return a column of numbers."""
     return Column(name, "float64", unit, meaning)
 
 
 def _whole_number(name: str, unit: str, meaning: str) -> Column:
-    """Return a column of whole numbers."""
     return Column(name, "int64", unit, meaning)
 
 
 def _text(name: str, meaning: str) -> Column:
-    """Return a column of text."""
     return Column(name, "str", "", meaning)
 
 
 def _per_building(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
-    """Return a column of numbers for each of the two buildings."""
     first = _number(f"{name}_1", unit, f"building 1: {meaning}")
     second = _number(f"{name}_2", unit, f"building 2: {meaning}")
     return first, second

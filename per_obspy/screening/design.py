@@ -19,7 +19,7 @@ from per_obspy.errors import CatalogError, reason_of
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.files.text_lines import check_separator, check_text
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.ranking import worst_first
+from per_obspy.screening.ranking import kept_apart, without_gap, worst_first
 from per_obspy.screening.spectral_demand import (
     Limits,
     SpectralMotion,
@@ -32,7 +32,6 @@ from per_obspy.screening.station_motion import (
     log_period_and_damping,
     stored_log,
 )
-from per_obspy.screening.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import both, values
 
 #: Largest value that a spectrum may have and its unit: larger ones are in other units (ms, per

@@ -193,7 +193,6 @@ def _blocks(mask: BoolArray) -> list[IndexArray]:
 
 
 def _fill(result: Columns, rows: IndexArray, part: Columns) -> None:
-    """Put the columns of some rows in place."""
     for name, column in part.items():
         result[name][rows] = column
 
@@ -288,7 +287,6 @@ def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
 
 
 def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
-    """Return the motion at the site at nodes of both buildings, demands being medians."""
     sample = _sampled_buildings(block.table, nodes)
     demand, velocity = _in_record(block, sample, len(nodes))
     # equal motions leave the round-off of their difference

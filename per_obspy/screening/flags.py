@@ -92,7 +92,6 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
 
 
 def _are_equal(table: Table) -> BoolArray:
-    """Return a mask of pairs of equal oscillators."""
     period_1, damping_1, period_2, damping_2 = oscillators(table)
     return np.asarray((period_1 == period_2) & (damping_1 == damping_2))
 
@@ -142,13 +141,11 @@ def record_flags(station: xr.Dataset) -> list[str]:
 
 
 def _outside_usable_periods(table: Table, station: xr.Dataset) -> BoolArray:
-    """Return a mask of pairs with a period outside the usable periods of the record."""
     periods = np.stack(both(table, "period"))
     shortest, longest = (number(station, f"{end}_usable_period") for end in ("shortest", "longest"))
     return np.asarray(((periods < shortest) | (periods > longest)).any(axis=0))
 
 
 def _per_far_above_sd(table: Table, limit: float) -> BoolArray:
-    """Return a mask of pairs in which a building has PER / SD above a limit."""
     per, sd = np.stack(both(table, "per")), np.stack(both(table, "sd"))
     return np.asarray((per > limit * sd).any(axis=0))

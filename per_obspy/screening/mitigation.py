@@ -17,6 +17,7 @@ from per_obspy.kernels.pairs.added_damping import least_dampings
 from per_obspy.pounding.bumpers import required_restitution
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap, srss_gap
+from per_obspy.screening.estimates import governing, governing_radii
 from per_obspy.screening.exact import NEEDED, least_exact_damping
 from per_obspy.screening.station_motion import StationMotion, nearest_azimuth, stored_log
 from per_obspy.screening.values import (
@@ -29,7 +30,6 @@ from per_obspy.screening.values import (
     only,
     values,
 )
-from per_obspy.screening.yielding import governing, governing_radii
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4

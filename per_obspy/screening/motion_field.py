@@ -396,7 +396,6 @@ def fitted_field(
 
 
 def _checked_grid(stations: Sites, ln_per: ArrayLike, periods: ArrayLike) -> Both:
-    """Return ln PER of every station and the grid of periods."""
     # Shapes first, then a grid that can be interpolated
     values = checks.finite("ln_per", ln_per)
     grid = np.atleast_1d(checks.positive("periods", periods))

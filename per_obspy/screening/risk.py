@@ -29,7 +29,7 @@ from per_obspy.screening.flags import (
 )
 from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.ranking import KEYS, state_columns, worst_first
+from per_obspy.screening.ranking import KEYS, kept_apart, state_columns, without_gap, worst_first
 from per_obspy.screening.shakemap import shakemap_rows
 from per_obspy.screening.site_motion import (
     RegionalMotion,
@@ -50,7 +50,6 @@ from per_obspy.screening.station_motion import (
     motion_of_one_horizontal,
     station_motion,
 )
-from per_obspy.screening.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import Columns, IndexArray, at_contact, chosen, joined, values
 from per_obspy.spectra.station import lacks_azimuths
 
@@ -150,7 +149,6 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
 def _rows_at_stations(
     pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening
 ) -> pd.DataFrame:
-    """Return the rows of pairs that have a station."""
     index = pairs["station_index"].to_numpy(np.int64)
     if ground.field is not None:
         pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, index))
@@ -298,7 +296,6 @@ def risk_table(
 
 
 def _datasets(spectra: object) -> list[xr.Dataset]:
-    """Return the stations as a list."""
     expected = "a Dataset from station_spectra, or a sequence of such"
     if isinstance(spectra, xr.Dataset):
         return [spectra]

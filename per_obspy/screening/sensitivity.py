@@ -20,9 +20,9 @@ from per_obspy.screening.population import (
     median_gap,
     one_wall_chance,
 )
+from per_obspy.screening.ranking import kept_apart
 from per_obspy.screening.risk import risk_rows
 from per_obspy.screening.site_motion import RegionalMotion
-from per_obspy.screening.unknown_gaps import kept_apart
 from per_obspy.screening.values import BoolArray, values
 
 #: Inputs that have a logarithmic standard deviation; the gap has one in metres.
@@ -156,7 +156,6 @@ def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFrame:
-    """Return a pair table in which one input is certain."""
     changed = given.assign(**{name: value})
     if name == "period_correlation":
         return changed
@@ -164,7 +163,6 @@ def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFra
 
 
 def _deviation(name: str) -> str:
-    """Return the column of the log-standard deviation of an input of a building."""
     return f"{name.split('_')[0]}_log_std_{name[-1]}"
 
 

@@ -270,7 +270,6 @@ def _station_motion(station: xr.Dataset) -> _StationMotion:
 
 
 def _places_of(motions: list[_StationMotion]) -> Sites:
-    """Return the places of stations."""
     return sites(
         [motion.longitude for motion in motions],
         [motion.latitude for motion in motions],

@@ -93,7 +93,6 @@ def compare_stations(
 
 
 def _peaks(stations: Sequence[xr.Dataset]) -> Peaks:
-    """Return places, ground and peaks of stations."""
     # The larger horizontal, which stations.csv shows; horizontals come before the vertical
     measured = [
         [

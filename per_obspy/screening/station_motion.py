@@ -28,7 +28,7 @@ from per_obspy.spectra.azimuthal import (
     azimuthal_per_spectrum,
     azimuthal_sd_spectrum,
 )
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima
 
 #: Dampings are compared on a logarithmic scale; below this one they count as it.
 SMALLEST_DAMPING = 1e-3

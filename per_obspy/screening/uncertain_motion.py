@@ -347,7 +347,6 @@ def is_exact(table: Table) -> BoolArray:
 
 
 def _governing_correlation(table: Table) -> FloatArray:
-    """Return the correlation that governs the demand."""
     rule = np.asarray(table["demand_rule"])
     of_record, linearized = rule == "per_record", rule == "linearized"
     elastic = np.where(of_record, table["correlation_record"], table["correlation"])

@@ -27,8 +27,7 @@ from per_obspy.pounding.structure import Structure
 from per_obspy.progress import Progress
 from per_obspy.screening.risk import risk_table
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
-from per_obspy.spectra.elastic import per_spectrum, response_spectra
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima, per_spectrum, response_spectra
 
 #: Stage that the first run waits for.
 COMPILING = "loading kernels (the first run compiles them for a minute)"
@@ -56,7 +55,6 @@ BOTH = np.stack([PULSE, PULSE])
 
 
 def _histories() -> None:
-    """Compile the kernels of histories of pairs, of rows, and of the single one of the page."""
     oscillators = [0.5], 0.05, 1.0, [0.7], 0.05, 1.0
     pounding_histories(BOTH, INTERVAL, *oscillators, 0.001, 0.65, azimuth=[0.0])
     structures = [Structure(0.5, 0.05, 1.0), Structure(0.7, 0.05, 1.0)]

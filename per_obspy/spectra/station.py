@@ -281,7 +281,6 @@ def station_spectra(
 
 
 def _grid(periods: ArrayLike | None) -> FloatArray:
-    """Return the periods of the spectra, s."""
     if periods is None:
         return np.geomspace(SHORTEST_STORED_PERIOD, LONGEST_STORED_PERIOD, STORED_PERIODS)
     return np.atleast_1d(checks.positive("periods", periods))
@@ -364,7 +363,6 @@ def _check_match(first: Trace, second: Trace) -> None:
 def _component_spectra(
     traces: dict[str, Trace], periods: FloatArray, dampings: FloatArray
 ) -> xr.Dataset:
-    """Return PER, SD and absolute SA of every component."""
     spectra = [
         response_spectra(trace.data, trace.stats.delta, periods, dampings)
         for trace in traces.values()
@@ -401,7 +399,6 @@ def _by_component(spectra: list[FloatArray], units: str, title: str) -> Variable
 
 
 def _axes(components: list[str], periods: FloatArray, dampings: FloatArray) -> dict[str, Variable]:
-    """Return the coordinates of spectra of components."""
     damping = {"units": "1", "long_name": "damping ratio, fraction of critical"}
     return {
         "component_name": (
@@ -457,7 +454,6 @@ def _by_azimuth(name: str, values: FloatArray, title: str, step: int) -> dict[st
 
 
 def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Dataset:
-    """Return the processed horizontal acceleration."""
     azimuth = {
         "units": "degree",
         "long_name": "azimuth of the motion, clockwise from north; missing if unknown",
@@ -557,5 +553,4 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
 
 
 def _is_simulated(traces: list[Trace]) -> bool:
-    """Return whether any of some traces is marked as simulated."""
     return any(trace.stats.get("simulated", False) for trace in traces)

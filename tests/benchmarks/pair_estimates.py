@@ -22,7 +22,7 @@ from per_obspy.pounding.relative import (
     directional_relative_displacement,
 )
 from per_obspy.pounding.single_hit import single_hit
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima
 
 PAIRS, SAMPLES, DT = 100_000, 12_000, 0.01
 

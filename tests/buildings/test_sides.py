@@ -15,7 +15,7 @@ from per_obspy.buildings.sides import (
     directions,
 )
 from per_obspy.buildings.tables import sides_query
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import UNKNOWN_CLASS
 
 CLASSES = {"high": 0.2, "low": 0.0}
 

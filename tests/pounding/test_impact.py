@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from per_obspy.pounding.impact import post_impact_velocities, transfer_energies
+from per_obspy.pounding.single_hit import post_impact_velocities, transfer_energies
 
 velocities = st.floats(-10.0, 10.0)
 masses = st.floats(1.0, 1e6)

@@ -16,7 +16,7 @@ from per_obspy.pounding.row_maxima import (
     run_logged_block,
     run_row_blocks,
 )
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra.elastic import azimuth_maxima
 
 
 @given(st.lists(st.tuples(st.integers(1, 40), st.sampled_from([1, 2])), min_size=1, max_size=60))

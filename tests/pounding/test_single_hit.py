@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from per_obspy.pounding.critical_gap import critical_gap
-from per_obspy.pounding.impact import transfer_energies
-from per_obspy.pounding.single_hit import single_hit
+from per_obspy.pounding.single_hit import single_hit, transfer_energies
 
 radii = st.floats(0.05, 2.0)
 periods = st.floats(0.1, 5.0)

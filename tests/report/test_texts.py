@@ -16,8 +16,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.report.texts import LANGUAGES, _entries, counted, fixed_phrases, texts_of
 from per_obspy.results.coverage import _FAULTS, _KINDS, OTHERS
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
-from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_CLASS
 from per_obspy.watch import groups
 
 ROOT = Path(per_obspy.__file__).parent

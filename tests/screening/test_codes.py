@@ -14,7 +14,7 @@ from per_obspy.config import Building, Codes
 from per_obspy.config.screening import CodeRule
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.codes import NTC_SIMPLIFIED, code_columns, code_rules, required_gaps
-from per_obspy.screening.unknown_gaps import kept_apart, without_gap
+from per_obspy.screening.ranking import kept_apart, without_gap
 
 REGION = Codes(ntc_zone="III", gb_intensity=8)
 

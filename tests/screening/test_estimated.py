@@ -8,10 +8,10 @@ from screening_samples import make_pairs, make_station
 import per_obspy
 from per_obspy.config import Screening
 from per_obspy.pounding.reliability import per_error
+from per_obspy.screening.estimates import linearized_columns
 from per_obspy.screening.exact_population import record_population
 from per_obspy.screening.station_motion import station_motion, stored_log
 from per_obspy.screening.uncertain_motion import period_correlation
-from per_obspy.screening.yielding import linearized_columns
 
 
 def _row(station, **row):

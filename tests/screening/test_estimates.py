@@ -8,12 +8,11 @@ import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.columns import RESULTS
-from per_obspy.screening.estimates import demand_columns
+from per_obspy.screening.estimates import demand_columns, linearized_columns
 from per_obspy.screening.exact import EXACT_COLUMNS
 from per_obspy.screening.risk import INTERMEDIATE
 from per_obspy.screening.station_motion import motion_along_every_azimuth
 from per_obspy.screening.values import at_contact, both, values
-from per_obspy.screening.yielding import linearized_columns
 
 
 def _estimated(record, rows):

@@ -9,12 +9,12 @@ from screening_samples import make_station, table_of
 
 import per_obspy
 from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.estimates import linearized_columns
 from per_obspy.screening.exact import least_exact_damping
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.mitigation import LARGEST_DAMPING, mitigation_columns
 from per_obspy.screening.station_motion import station_motion
 from per_obspy.screening.values import at_contact, both, values
-from per_obspy.screening.yielding import linearized_columns
 
 TARGET = 1.25
 

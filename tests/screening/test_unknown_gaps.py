@@ -14,9 +14,8 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.assignment import assigned, stations_of
 from per_obspy.screening.design import DesignSpectrum, design_table
 from per_obspy.screening.population import gap_dispersion, median_gap
-from per_obspy.screening.ranking import in_order
+from per_obspy.screening.ranking import NUMBERS, TEXTS, UNKNOWN_CLASS, in_order, kept_apart
 from per_obspy.screening.shakemap import shakemap_rows
-from per_obspy.screening.unknown_gaps import NUMBERS, TEXTS, UNKNOWN_CLASS, kept_apart
 
 #: Pairs that differ in how their demand is found, and one of everything that codes ask for.
 KINDS = [

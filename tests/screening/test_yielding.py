@@ -9,10 +9,10 @@ from screening_samples import make_station, table_of
 import per_obspy
 from per_obspy.pounding.equivalent_linear import iwan
 from per_obspy.screening.columns import RESULTS
+from per_obspy.screening.estimates import linearized_columns
 from per_obspy.screening.risk import INTERMEDIATE
 from per_obspy.screening.station_motion import station_motion
 from per_obspy.screening.values import values
-from per_obspy.screening.yielding import linearized_columns
 
 #: Columns of lengths, and of pure numbers and seconds.
 LENGTHS = ("critical_gap_linearized", "equivalent_per_1", "equivalent_per_2")

@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.spectra import elastic, per_pair
-from per_obspy.spectra.elastic import response_spectra
-from per_obspy.spectra.per_pair import azimuth_maxima
+from per_obspy.spectra import elastic
+from per_obspy.spectra.elastic import azimuth_maxima, response_spectra
 
 DT = 0.01
 
@@ -97,7 +96,7 @@ def test_other_oscillators_and_threads_change_no_bit(monkeypatch):
         chosen = [values[part] for values in oscillators]
         for alone, among in zip(azimuth_maxima(north, east, dt, *chosen), together, strict=True):
             assert_array_equal(alone, among[part])
-    monkeypatch.setattr(per_pair, "PART", 5)
+    monkeypatch.setattr(elastic, "PART", 5)
     monkeypatch.setattr(elastic, "STEPS_WORTH_THREADS", 0)
     monkeypatch.setattr("per_obspy.threads.usable_processors", lambda: 3)
     for threaded, among in zip(

@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.report.tally import MOST_CELLS, PAGE_PAIRS, SMALLEST_CELL, CellCounts, PairTally
-from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_CLASS
 
 from .made_up import CLASSES, pair_table
 
