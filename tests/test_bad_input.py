@@ -245,6 +245,11 @@ WHOLE = {
         "run run.toml",
         "grid.xml: ",
     ),
+    "half a list of stations": (
+        {"run.toml": MAPPED.replace("shakemap", "stationlist"), "grid.xml": '{"features": ['},
+        "run run.toml",
+        "grid.xml: cannot be read as JSON",
+    ),
     "no such map": (
         {"run.toml": MAPPED},
         "run run.toml",

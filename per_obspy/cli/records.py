@@ -141,6 +141,7 @@ def _print_fetched(
 def _print_map(found: "ShakeMapFiles") -> None:
     """Say on standard error which map there is, and how a run takes it."""
     names = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
+    names |= {"stationlist": found.stations}
     options = " ".join(f"--set records.{name}={path}" for name, path in names.items() if path)
     print(f"ShakeMap, version {found.version}: per-obspy run ... {options}", file=sys.stderr)
 

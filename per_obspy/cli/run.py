@@ -328,7 +328,12 @@ def _print_counts(record: dict[str, Any]) -> None:
     # Stations, pairs by state, and all rejections together
     states = ", ".join(state_texts(counts))
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
-    print(f"{counts['stations']} stations, {counts['pairs']} pairs: {states}; {rejected} rejected")
+    alone = counts.get("stations_amplitudes_only", 0)
+    others = f" and {alone} with amplitudes only" if alone else ""
+    stations = f"{counts['stations']} stations{others}"
+    print(f"{stations}, {counts['pairs']} pairs: {states}; {rejected} rejected")
+    if people := counts.get("intensities_left_out", 0):
+        print(f"{people} intensities that people reported are left out")
 
 
 def print_coverage(record: "Mapping[str, Any]") -> None:

@@ -345,10 +345,21 @@ class Records(Section):
         None, description="uncertainty.xml of the same ShakeMap"
     )
 
+    stationlist: RelativePath | None = Field(
+        None,
+        description=(
+            "stationlist.json of a USGS ShakeMap: amplitudes of stations without a record, for "
+            "pairs that no record reaches, or only one beyond screening.flag_distance"
+        ),
+    )
+
     @model_validator(mode="after")
     def _any_source(self) -> Self:
-        if not any((self.folder, self.columns, self.fdsn, self.sds, self.asdf, self.shakemap)):
-            raise ValueError("give at least one of folder, columns, fdsn, sds, asdf and shakemap")
+        records = (self.folder, self.columns, self.fdsn, self.sds, self.asdf)
+        if not any((*records, self.shakemap, self.stationlist)):
+            raise ValueError(
+                "give at least one of folder, columns, fdsn, sds, asdf, shakemap and stationlist"
+            )
         return self
 
     @model_validator(mode="after")

@@ -164,7 +164,7 @@ def input_files(records: config.Records | None, fetched: "Fetched | None") -> li
     if fetched:
         places += [fetched.folder, fetched.event.path if fetched.event else None]
     places += [records.asdf.file] if records.asdf else []
-    places += [records.shakemap, records.shakemap_uncertainty]
+    places += [records.shakemap, records.shakemap_uncertainty, records.stationlist]
     files = []
     for place in filter(None, places):
         files += files_below(place)[0] if place.is_dir() else [place]

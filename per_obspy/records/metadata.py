@@ -46,6 +46,7 @@ from per_obspy.records.archive import read_file
 from per_obspy.records.earthquakes.earthquake import Earthquake, header_event
 from per_obspy.records.file_list import files_below
 from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
+from per_obspy.records.station_list import MARK
 from per_obspy.units import unit_of_si
 
 log = logging.getLogger(__name__)
@@ -57,6 +58,7 @@ _MARKS = {
     b"#Network": "station text",
     b"quakeml": "event",
     b'"shard": ': "description",
+    MARK: "amplitudes",
 }
 
 #: Beginnings of logical records of SEED: a number, and the type of a volume header or of data.

@@ -34,6 +34,7 @@ DOUBTS = {
     "far_station": "sure_far",
     "record_from_other_site_class": "sure_station_class",
     "record_warning": "sure_record",
+    "amplitudes_only": "sure_amplitudes",
     "shakemap_demand": "sure_map",
 }
 

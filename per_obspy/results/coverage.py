@@ -35,6 +35,8 @@ OTHERS = "other reasons"
 _KINDS = (
     (r"ShakeMap has no motion", "no motion on the ShakeMap"),
     (r"outside the ShakeMap", "outside the ShakeMap"),
+    (r"are outside the amplitudes'", "outside the periods of station amplitudes"),
+    (r"^nearest amplitudes ", "no station within reach"),
     (r"^none of height", "no height, storeys or period"),
     (r"^nearest station ", "no station within reach"),
     (r"^no station has coordinates", "no station with coordinates"),

@@ -11,6 +11,7 @@ import xarray as xr
 
 from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import Column
+from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.table_files import rounded_table, write_csv, write_described
 from per_obspy.screening.flags import record_flags
 from per_obspy.screening.motion_field import great_circle
@@ -27,7 +28,11 @@ COLUMNS: dict[str, Column] = {
     **_columns(
         "str",
         ("station", "", "network and station code"),
-        ("state", "", "used: its record serves the pairs near it; rejected: it serves none"),
+        (
+            "state",
+            "",
+            "used: its record or amplitudes serve the pairs near it; rejected: it serves none",
+        ),
         ("rejected", "", "rejected records of the station, with every reason"),
         ("flags", "", "flags that every pair of the station has, separated by spaces"),
         ("warnings", "", "failed checks of its records to look at, with channel"),
@@ -73,13 +78,16 @@ COLUMNS: dict[str, Column] = {
         ("lowpass_source", "", "reasons for the low-pass corners of the horizontals"),
         ("components", "", "channels that are used"),
         ("instrument", "", "location code, band and model; empty if unknown"),
-        ("record_level", "", "raw, or processed by others, as the records were read"),
+        ("record_level", "", "raw, processed by others, or amplitudes without a record"),
         ("source_files", "", "files of the records"),
     ),
 }
 
 #: Flag of a station with a single horizontal.
 ONE_HORIZONTAL = "one_horizontal"
+
+#: Flag of a station whose record is not at hand, and of pairs that its amplitudes serve.
+AMPLITUDES_ONLY = "amplitudes_only"
 
 
 class StationSummary(NamedTuple):
@@ -103,18 +111,19 @@ def write_stations(
     rejected: Iterable[Rejection],
     pairs: Mapping[str, int],
     folder: Path,
+    amplitudes: Iterable[StationAmplitudes] = (),
 ) -> StationSummary:
     """
     Write ``stations.csv`` and ``stations.columns.csv``; see :func:`station_table`.
 
     Parameters
     ----------
-    spectra, rejected, pairs
+    spectra, rejected, pairs, amplitudes
         As for :func:`station_table`.
     folder : Path
         The file.
     """
-    table = station_table(spectra, rejected, pairs)
+    table = station_table(spectra, rejected, pairs, amplitudes)
     text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
     write_csv(rounded_table(table, own=table.columns), text)
     write_described(COLUMNS.values(), columns)
@@ -128,7 +137,10 @@ def write_stations(
 
 
 def station_table(
-    spectra: Iterable[xr.Dataset], rejected: Iterable[Rejection], pairs: Mapping[str, int]
+    spectra: Iterable[xr.Dataset],
+    rejected: Iterable[Rejection],
+    pairs: Mapping[str, int],
+    amplitudes: Iterable[StationAmplitudes] = (),
 ) -> pd.DataFrame:
     """
     Return one row per station, sorted by name.
@@ -142,6 +154,8 @@ def station_table(
         Rejections; those of files, services and pairs are passed over.
     pairs : mapping
         Station -> number of pairs for which its record is used.
+    amplitudes : iterable of StationAmplitudes
+        Stations of which only amplitudes are used.
 
     Returns
     -------
@@ -150,6 +164,7 @@ def station_table(
     """
     reasons = _reasons(rejected)
     rows = {name: _row(station, pairs) for name, station in _named(spectra).items()}
+    rows = {station.name: _row_of_amplitudes(station) for station in amplitudes} | rows
     for name, texts in reasons.items():
         row = rows.setdefault(name, {"station": name, "state": "rejected", "pairs": 0})
         row["rejected"] = "; ".join(texts)
@@ -199,6 +214,22 @@ def _row(station: xr.Dataset, pairs: Mapping[str, int]) -> dict[str, Any]:
         **_motion(station),
         **_corners(station),
         **_texts(station),
+    }
+
+
+def _row_of_amplitudes(station: StationAmplitudes) -> dict[str, Any]:
+    """Return the row of a station without a record."""
+    facts = ("longitude", "latitude", "vs30", "pga", "pgv", "warnings")
+    return {
+        "station": station.name,
+        "state": "used",
+        "flags": AMPLITUDES_ONLY,
+        "pairs": 0,
+        **{name: getattr(station, name) for name in facts},
+        "shortest_usable_period": station.periods[0],
+        "longest_usable_period": station.periods[-1],
+        "components": " ".join(station.channels),
+        "record_level": "amplitudes",
     }
 
 

@@ -23,6 +23,7 @@ from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.reading import checked_file
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.records.shakemap import read_shakemap
+from per_obspy.records.station_list import read_station_list
 from per_obspy.runs.inputs.drawn_pairs import pair_table
 from per_obspy.runs.tasks.ground_files import StationFile
 from per_obspy.screening.assignment import nearest_station
@@ -64,7 +65,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
 
 def check_inputs(settings: Run, folder: Path) -> None:
     """
-    Check the head of the pair table, the named inventories, the area, and the whole ShakeMap.
+    Check the head of the pair table, the named inventories, the area, ShakeMap and station list.
 
     Parameters
     ----------
@@ -90,6 +91,8 @@ def check_inputs(settings: Run, folder: Path) -> None:
         named_files(pairs.names, pairs.catalog)
     if settings.records and settings.records.shakemap:
         read_shakemap(settings.records.shakemap, settings.records.shakemap_uncertainty)
+    if settings.records and settings.records.stationlist:
+        read_station_list(settings.records.stationlist)
     if not is_pending:
         _check_area(settings, folder)
 

@@ -13,6 +13,7 @@ from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
+from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.results.coverage import Coverage, CoverageTally
 from per_obspy.results.risk import RiskFiles, write_risk
 from per_obspy.results.table_files import write_rejected
@@ -26,8 +27,10 @@ from per_obspy.runs.tasks.chunk import CHUNK, ChunkTask
 from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
 from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
-from per_obspy.runs.tasks.station import FinishedStation
+from per_obspy.runs.tasks.station import FinishedStation, hypocentre_attributes
 from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.screening.site_motion import hypocentre_of
+from per_obspy.screening.station_amplitudes import AmplitudeField
 
 #: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
 CHUNKS_PER_WORKER = 4
@@ -79,6 +82,8 @@ class Screened(NamedTuple):
         Sentences on the recognised form of the pair tables, and on what is odd in them.
     coverage : Coverage
         Rows of the pair tables, and those that are left out.
+    amplitudes : AmplitudeField or None
+        Motion of stations of which only amplitudes are known.
     """
 
     outputs: list[Path]
@@ -88,6 +93,7 @@ class Screened(NamedTuple):
     failed: bool
     pair_tables: PairNotes
     coverage: Coverage
+    amplitudes: AmplitudeField | None = None
 
 
 def screened(
@@ -111,10 +117,9 @@ def screened(
         If the inventory is wrong as a whole.
     """
     settings, folder = context.settings, context.folder
-    maps = shakemap_files(settings)
-    ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
-    # Pairs need a station or a map
-    screens = _parts if stations or maps else _no_parts
+    ground, unplaced = ground_of_run(settings, stations)
+    # Pairs need a station, amplitudes of one, or a map
+    screens = _parts if stations or ground.amplitudes or ground.shakemap else _no_parts
     parts, notes, tally = screens(context, ground)
     states, served, rows = Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
@@ -135,6 +140,7 @@ def screened(
         rows.failed or _any_failed(parts),
         notes,
         tally.coverage(counts),
+        ground.amplitudes,
     )
 
 
@@ -171,6 +177,23 @@ def _counts(
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
     counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
     return counts | rows.counts
+
+
+def ground_of_run(
+    settings: Run, stations: Sequence[FinishedStation]
+) -> tuple[GroundFiles, tuple[Rejection, ...]]:
+    """Return the ground motion of a run, and the stations of which nothing is used."""
+    records = settings.records
+    listed = records.stationlist if records else None
+    # The hypocentre, where no record has it
+    event = read_event_file(records.event) if records and records.event and listed else None
+    return ground_files(
+        stations,
+        shakemap_files(settings),
+        settings.screening.interpolation,
+        listed,
+        hypocentre_of([hypocentre_attributes(event)]),
+    )
 
 
 def shakemap_files(settings: Run) -> tuple[Path, ...]:

@@ -128,9 +128,9 @@ def new_report(context: RunContext, record: dict[str, Any]) -> Result:
 
 
 def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
-    """Return the stations of the latest run; empty if only a ShakeMap served its pairs."""
+    """Return the stations of the latest run; empty if no record served its pairs."""
     records = settings.records
-    has_map = records is not None and records.shakemap is not None
+    has_map = records is not None and (records.shakemap or records.stationlist) is not None
     if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
         return []
     return stations_of_earlier_run(folder)
@@ -169,7 +169,9 @@ def _later_stages(
     with timed(record.seconds, "screening"), record.with_engine(folder, executor):
         found = screened(context, usable, rejected)
         spectra = [station.spectra for station in usable if station.spectra is not None]
-        table = write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
+        alone = found.amplitudes.stations if found.amplitudes else ()
+        left_out = [*rejected, *found.unplaced]
+        table = write_stations(spectra, left_out, found.served.pairs, folder, alone)
     # Everything that is read from them
     with timed(record.seconds, "report"):
         report = reported(context, usable, found.coverage)
@@ -206,7 +208,10 @@ def _with_counts(
         "stations_simulated": simulated_stations(usable),
         **found.counts,
     }
-    unplaced = {rejection.name for rejection in found.unplaced}
+    if found.amplitudes:
+        counts["stations_amplitudes_only"] = len(found.amplitudes.stations)
+        counts["intensities_left_out"] = found.amplitudes.intensities
+    unplaced = {rejection.name for rejection in found.unplaced if rejection.kind == "station"}
     serving = [station.station for station in usable if station.station not in unplaced]
     # Rejections make a result partial
     return replace(

@@ -92,7 +92,8 @@ RESULTS: dict[str, Column] = {
         ),
         _text(
             "demand_rule",
-            "rule of the demand: exact, per_white_noise, per_record, linearized, srss or shakemap",
+            "rule of the demand: exact, per_white_noise, per_record, linearized, srss, "
+            "shakemap or amplitudes",
         ),
         _number(
             "demand_estimated",

@@ -28,6 +28,7 @@ DEMAND_RULES: dict[str, str] = {
     "linearized": "estimate for yielding buildings",
     "srss": "SRSS, because a period is derived",
     "shakemap": "from a ShakeMap",
+    "amplitudes": "from amplitudes of stations",
     "sd_white_noise": "estimate from the spectrum",
     "sd_srss": "SRSS of the spectrum, because a period is derived",
 }
@@ -89,6 +90,10 @@ FLAGS: dict[str, str] = {
     ),
     "motion_from_other_site_class": (
         "no station of the site's class contributes to the motion at the site: others do"
+    ),
+    "amplitudes_only": (
+        "the nearest stations have amplitudes but no record: demand from the SD between stations, "
+        "without PER, record and exact history"
     ),
     "shakemap_demand": (
         "no station in reach: demand from the SD of a ShakeMap, "

@@ -37,6 +37,11 @@ from per_obspy.screening.site_motion import (
     motion_at_pairs,
     prepared_field,
 )
+from per_obspy.screening.station_amplitudes import (
+    amplitude_rows,
+    amplitudes_in_reach,
+    served_by_amplitudes,
+)
 from per_obspy.screening.station_motion import (
     PairMotion,
     StationMotion,
@@ -86,11 +91,15 @@ def risk_rows(
         Columns in the order of ``screening.columns.ORDER`` without ``rank``, then the other columns
         of the pair table.
     rejected : tuple of Rejection
-        Pairs that neither a station nor the map serves.
+        Pairs that neither a station, amplitudes nor the map serve.
     """
     complete = kept_apart(completed_pairs(_without_results(pairs), building))
     placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
     tables = []
+    # pairs far from every record and nearer to a station with amplitudes
+    if ground.amplitudes is not None:
+        rows, placed, rejected = _by_amplitudes(complete, placed, rejected, ground, screening)
+        tables += [rows] if len(rows) else []
     if len(placed):
         tables.append(_rows_at_stations(placed.reset_index(drop=True), ground, screening))
     # pairs without a station in reach fall back on the map
@@ -101,6 +110,34 @@ def risk_rows(
     if not tables:
         return _ordered(placed.reindex(columns=[*ORDER])), rejected
     return _ordered(without_gap(pd.concat(tables, ignore_index=True))), rejected
+
+
+def _by_amplitudes(
+    pairs: pd.DataFrame,
+    placed: pd.DataFrame,
+    rejected: tuple[Rejection, ...],
+    ground: RegionalMotion,
+    screening: Screening,
+) -> tuple[pd.DataFrame, pd.DataFrame, tuple[Rejection, ...]]:
+    """Return the rows that amplitudes give, and the pairs with a station and the others left."""
+    assert ground.amplitudes is not None  # asked for with amplitudes only
+    near = amplitudes_in_reach(ground.amplitudes, pairs, screening.largest_distance)
+    to_record = placed["distance"].reindex(pairs.index).fillna(np.inf)
+    served = served_by_amplitudes(near.distance, to_record.to_numpy(np.float64), screening)
+    chosen_pairs = pairs[served].reset_index(drop=True)
+    rows = (
+        amplitude_rows(ground.amplitudes, chosen_pairs, screening) if served.any() else placed[:0]
+    )
+    # the others, with the reason of the amplitudes after that of the stations
+    names = {*chosen_pairs["pair_id"]}
+    why = dict(zip(pairs["pair_id"], near.reasons, strict=True))
+    is_alone = not ground.stations.names.size
+    left = tuple(
+        one._replace(reasons=(*(() if is_alone else one.reasons), why[one.name]))
+        for one in rejected
+        if one.name not in names
+    )
+    return rows, placed[~placed["pair_id"].isin(names)], left
 
 
 def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:

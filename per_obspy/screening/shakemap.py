@@ -8,7 +8,7 @@ that from PER (`per_obspy.pounding.reliability`).
 Other dampings are reached by the factor of EN 1998-1. Flags of every row report these assumptions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from per_obspy.screening.spectral_demand import (
     spectral_rows,
 )
 from per_obspy.screening.station_motion import LogSpectra
-from per_obspy.screening.values import Table, both, values
+from per_obspy.screening.values import BoolArray, Table, both, values
 
 #: Dampings between which the factor of EN 1998-1 is interpolated when dampings are resampled;
 #: beyond it is kept.
@@ -193,18 +193,34 @@ def _rows(
     shakemap: xr.Dataset, motion: MapMotion, pairs: pd.DataFrame, screening: Screening
 ) -> pd.DataFrame:
     """Return the rows of pairs that have a motion on the map."""
-    table = spectral_rows(pairs, map_motion(motion, pairs), screening)
-    table = table.assign(demand_rule="shakemap")
-    # flags of the map beside those of the pairs
-    every = np.ones(len(table), dtype=bool)
+    every = np.ones(len(pairs), dtype=bool)
     scenario = shakemap.attrs.get("shakemap_event_type", "").upper() == "SCENARIO"
-    raised = raised_by_pairs(table) | {
+    raised = {
         "shakemap_demand": every,
         "shakemap_assumed_deviation": every & ("psa_log_std" not in shakemap),
         "simulated": every & scenario,
     }
-    table = table.assign(flags=joined_flags(raised))
-    # columns of a risk table without data from a map, and without those of SD alone
+    return mapped_rows(motion, pairs, screening, "shakemap", raised)
+
+
+def mapped_rows(
+    motion: MapMotion,
+    pairs: pd.DataFrame,
+    screening: Screening,
+    rule: str,
+    raised: Mapping[str, BoolArray],
+) -> pd.DataFrame:
+    """
+    Return the rows of completed pairs by SD at their places, not ranked.
+
+    They have the columns of :func:`~per_obspy.screening.risk.risk_rows`; ``rule`` becomes
+    ``demand_rule``, ``raised`` are the flags of the motion.
+    """
+    table = spectral_rows(pairs, map_motion(motion, pairs), screening)
+    table = table.assign(demand_rule=rule)
+    # flags of the motion beside those of the pairs
+    table = table.assign(flags=joined_flags(raised_by_pairs(table) | dict(raised)))
+    # columns of a risk table that need a record are empty, and without those of SD alone
     lacking = [name for name in ORDER if name not in table and name != "rank"]
     table = table.assign(**{n: "" if RESULTS[n].dtype == "str" else np.nan for n in lacking})
     own = ["squares_decide", "srss_gap_sd", "absolute_gap_sd", ODD]

@@ -8,8 +8,8 @@ the only one; its ratio serves every damping and azimuth. The spatial correlatio
 spectral acceleration.
 """
 
-from collections.abc import Hashable, Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,6 +29,9 @@ from per_obspy.screening.motion_field import (
     on_grid,
 )
 from per_obspy.screening.values import IndexArray, number, values
+
+if TYPE_CHECKING:
+    from per_obspy.screening.station_amplitudes import AmplitudeField
 
 #: Largest distance between epicentres of one earthquake, m: agencies differ by less.
 SAME_EARTHQUAKE = 50_000.0
@@ -80,14 +83,17 @@ class RegionalMotion(NamedTuple):
         The motion between the stations; None if there are no stations.
     shakemap : Dataset or None
         ShakeMap for pairs without a station in reach.
+    amplitudes : AmplitudeField or None
+        Motion of stations of which only amplitudes are known.
     """
 
     stations: Stations
     field: StationField | None
     shakemap: xr.Dataset | None
+    amplitudes: "AmplitudeField | None" = None
 
 
-def hypocentre_of(attributes: Iterable[Mapping[Hashable, Any]]) -> Hypocentre | None:
+def hypocentre_of(attributes: Iterable[Mapping[Any, Any]]) -> Hypocentre | None:
     """
     Return the hypocentre of the earthquake that stations recorded.
 
@@ -158,7 +164,7 @@ def prepared_field(
     ln_per[still] = np.nan
     usable[still] = (np.inf, -np.inf)
 
-    places = _with_source_distance(source, _places_of(motions))
+    places = with_source_distance(source, _places_of(motions))
     field = fitted_field(places, np.nan_to_num(ln_per), usable, periods, settings)
     return StationField(field, ln_per, source)
 
@@ -196,7 +202,7 @@ def motion_at_pairs(
     record = np.broadcast_to(
         checks.between("station", station, 0, len(prepared.ln_per) - 1), len(pairs)
     ).astype(np.intp)
-    places = _with_source_distance(prepared.source, _places_of_pairs(pairs))
+    places = with_source_distance(prepared.source, places_of_pairs(pairs))
 
     columns: dict[str, NDArray[np.generic]] = {}
     fallback = np.zeros(len(pairs), dtype=bool)
@@ -210,7 +216,7 @@ def motion_at_pairs(
     return columns | {"motion_from_other_site_class": fallback}
 
 
-def _places_of_pairs(pairs: pd.DataFrame) -> Sites:
+def places_of_pairs(pairs: pd.DataFrame) -> Sites:
     """Return the places of pairs, with site class and Vs30 where the table has them."""
     site_class = pairs["site_class"].to_numpy(dtype=object) if "site_class" in pairs else ""
     vs30 = values(pairs, "vs30") if "vs30" in pairs else np.nan
@@ -226,7 +232,7 @@ def _stored_ln_per(prepared: StationField, record: IndexArray, period: FloatArra
     return stored
 
 
-def _with_source_distance(source: Hypocentre | None, places: Sites) -> Sites:
+def with_source_distance(source: Hypocentre | None, places: Sites) -> Sites:
     """Return the places with their distances from the hypocentre."""
     if source is None:
         return places
@@ -276,6 +282,11 @@ def _places_of(motions: list[_StationMotion]) -> Sites:
 def _ln_per(station: xr.Dataset) -> FloatArray:
     """Return ln PER at 5 % damping, minus infinity where there was no motion."""
     stored = station["per_rotd50"] if "per_rotd50" in station else station["per"][0]
+    return ln_at_reference_damping(station, np.asarray(stored))
+
+
+def ln_at_reference_damping(station: xr.Dataset, stored: ArrayLike) -> FloatArray:
+    """Return the logarithm of radii (n_dampings, n_periods) of a station at 5 % damping."""
     with np.errstate(divide="ignore"):
         radii = np.log(np.asarray(stored, dtype=np.float64))
 

@@ -285,7 +285,8 @@ def _has_records(settings: Run, fetched: Fetched | None) -> bool:
     """Return whether records or a ShakeMap are available for a run."""
     records = settings.records
     assert records is not None
-    others = (records.folder, records.columns, records.sds, records.asdf, records.shakemap)
+    motions = (records.shakemap, records.stationlist)
+    others = (records.folder, records.columns, records.sds, records.asdf, *motions)
     if any(map(bool, others)):
         return True
     if fetched is None:

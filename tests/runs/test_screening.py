@@ -1,5 +1,6 @@
 """Screening in chunks: results do not depend on them, and only changed ones are done again."""
 
+import json
 import re
 import shutil
 
@@ -333,6 +334,58 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     # and can be written again, in another language, also where no station was needed
     report(copied / "map.toml")
     screen(copied / "map.toml", executor=InProcess())
+
+
+def write_station_list(path, pairs, share=1.0):
+    """Write amplitudes of stations at the first and last pair, and one report of people."""
+    table = pd.read_csv(pairs, comment="#")
+    places = table[["longitude_1", "latitude_1"]].iloc[[0, -1, 0]].to_numpy().tolist()
+    values = {"sa(0.1)": 60.0, "sa(1.0)": 40.0 * share, "sa(5.0)": 3.0, "pga": 30.0}
+    amplitudes = [{"name": key, "value": one, "units": "%g"} for key, one in values.items()]
+    features = [
+        {
+            "geometry": {"type": "Point", "coordinates": place},
+            "properties": {
+                "network": "ZZ",
+                "code": f"A{i}",
+                "commType": "UNK",
+                "vs30": 400.0,
+                "station_type": "macroseismic" if i == 2 else "seismic",
+                "channels": [{"name": "UNK", "amplitudes": amplitudes}],
+            },
+        }
+        for i, place in enumerate(places)
+    ]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+
+
+def test_amplitudes_serve_pairs_far_from_every_record(copied):
+    # among the records, where would be found what is no record; would catch amplitudes that a
+    # second run, a changed list or a screening without records does not see
+    write_map_configuration(copied, 20_000.0)
+    write_station_list(copied / "records" / "list.json", copied / "pairs.csv")
+    text = (copied / "map.toml").read_text()
+    text = text.replace('shakemap = "grid.xml"', 'stationlist = "records/list.json"')
+    (copied / "map.toml").write_text(text.replace("[screening]", "[screening]\nflag_distance = 1"))
+    record = run(copied / "map.toml", executor=InProcess()).record
+    table = pd.read_parquet(copied / "map" / "risk.parquet")
+    alone = table["demand_rule"] == "amplitudes"
+    assert alone.any()
+    assert not alone.all()
+    assert table["flags"].str.contains("amplitudes_only").equals(alone)
+    counts = record["counts"]
+    assert (counts["stations_amplitudes_only"], counts["intensities_left_out"]) == (2, 1)
+    stations = pd.read_csv(copied / "map" / "stations.csv").set_index("station")
+    assert stations.loc["ZZ.A0", ["state", "flags", "pairs"]].tolist() == [
+        "used",
+        "amplitudes_only",
+        0,
+    ]
+    assert counts["rejected_file"] == 0
+    assert run(copied / "map.toml", executor=InProcess()).did_nothing
+    write_station_list(copied / "records" / "list.json", copied / "pairs.csv", share=2.0)
+    counts = run(copied / "map.toml", executor=InProcess()).record["counts"]
+    assert (counts["stations_resumed"], counts["chunks_resumed"]) == (3, 0)
 
 
 def test_a_changed_map_changes_every_chunk(copied):

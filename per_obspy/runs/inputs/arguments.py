@@ -203,6 +203,10 @@ def _tables_in(argument: str) -> list[Path]:
     return [file for file, kind in files.items() if kind in PAIR_KINDS]
 
 
+#: Kinds of files with a motion without a record, and their keys of the configuration.
+_MOTIONS = {Kind.SHAKEMAP: "shakemap", Kind.STATION_LIST: "stationlist"}
+
+
 def _records_content(records: str, output: Path) -> dict[str, Any]:
     """Return the sections of a configuration that name the records."""
     kind = kind_of(records)
@@ -212,8 +216,8 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
     path = Path(records).absolute()
     if kind is Kind.SCENARIO:
         return {"simulation": str(path)}
-    if kind is Kind.SHAKEMAP:
-        return {"records": {"shakemap": str(path)}}
+    if kind in _MOTIONS:
+        return {"records": {_MOTIONS[kind]: str(path)}}
     place, is_workspace = records_place(path)
     if is_workspace:
         return {"records": {"asdf": {"file": str(place)}}}
@@ -221,7 +225,7 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
         return {"records": {"folder": str(path)}}
     # Files with the records that describe the earthquake
     found = {"folder": str(path)}
-    for key, beside in (("event", Kind.EVENT), ("shakemap", Kind.SHAKEMAP)):
+    for beside, key in {Kind.EVENT: "event", **_MOTIONS}.items():
         files = [file for file, one in files_in(path).items() if one is beside]
         found |= {key: str(files[0])} if len(files) == 1 else {}
     return {"records": found}

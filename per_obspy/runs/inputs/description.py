@@ -205,21 +205,47 @@ def _of_shakemap(path: Path) -> Description:
         ("largest", f"{largest:.3g} m/s2 of {quantity}"),
         ("map", "# from half of it, + from a quarter, - below"),
     ]
-    east, north = (grid[name].to_numpy() for name in ("longitude", "latitude"))
+    east, north = np.meshgrid(*(grid[name].to_numpy() for name in ("longitude", "latitude")))
     known = {"event": event, "periods": periods, "largest": largest}
     title = "{1} by {0} points".format(*values.shape)
     return Description(Kind.SHAKEMAP, title, lines, _shares(east, north, values / largest), known)
 
 
+def _of_station_list(path: Path) -> Description:
+    """Describe a list of amplitudes; places are marked by their share of the largest motion."""
+    from per_obspy.records.station_list import read_station_list
+
+    found = read_station_list(path)
+    stations, count = found.stations, len(found.stations)
+    rejected = [(row.name, row.reasons) for row in found.rejected]
+    lines = [
+        ("stations", f"{count} usable, {len(rejected)} not"),
+        *_rejected_lines(rejected),
+        ("intensities", f"{found.intensities} of people, left out"),
+    ]
+    known = {"stations": count, "rejected": len(rejected), "intensities": found.intensities}
+    if not stations:
+        return Description(Kind.STATION_LIST, "no usable station", lines, {}, known, usable=False)
+    periods = sorted({period for station in stations for period in station.periods})
+    largest = np.array([max(station.displacements) for station in stations])
+    lines += [
+        ("periods", some([f"{period:g} s" for period in periods])),
+        ("largest", f"{largest.max():.3g} m of SD"),
+        ("map", "# from half of it, + from a quarter, - below"),
+    ]
+    east, north = np.array([(one.longitude, one.latitude) for one in stations]).T
+    places = _shares(east, north, largest / largest.max())
+    return Description(Kind.STATION_LIST, f"{count} stations", lines, places, known)
+
+
 def _shares(
     longitude: "FloatArray", latitude: "FloatArray", share: "FloatArray"
 ) -> dict[str, Places]:
-    """Return the places of a grid by their share of its largest value, the strongest last."""
-    east, north = np.meshgrid(longitude, latitude)
+    """Return places by their share of the largest value, the strongest last."""
     places = {}
     for sign, low, high in (("-", 0.0, 0.25), ("+", 0.25, 0.5), ("#", 0.5, np.inf)):
         inside = (share >= low) & (share < high)
-        places[sign] = (east[inside].tolist(), north[inside].tolist())
+        places[sign] = (longitude[inside].tolist(), latitude[inside].tolist())
     return places
 
 
@@ -598,6 +624,7 @@ _DESCRIBE: dict[Kind, Callable[[Path], Description]] = {
     Kind.FOOTPRINTS: _of_footprints,
     Kind.RISK: _of_risk_table,
     Kind.SHAKEMAP: _of_shakemap,
+    Kind.STATION_LIST: _of_station_list,
     Kind.SPECTRUM: _of_spectrum,
     Kind.SPECTRA: _of_spectra,
     Kind.EVENT: _of_event,

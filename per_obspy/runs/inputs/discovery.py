@@ -21,6 +21,9 @@ from per_obspy.runs.inputs.input_kinds import (
     kind_of,
 )
 
+#: Kinds of files that are a ground motion without a record.
+MOTIONS = (Kind.SHAKEMAP, Kind.STATION_LIST, Kind.SCENARIO)
+
 #: Files of a folder that are tried as records before it counts as one without any.
 TRIED = 20
 
@@ -48,7 +51,7 @@ def found_inputs(folder: Path) -> Found:
     files = files_in(folder)
     pairs = [path for path, kind in files.items() if kind in PAIR_KINDS]
     loose = [path for path, kind in files.items() if kind is Kind.RECORDS]
-    records = [path for path, kind in files.items() if kind in (Kind.SHAKEMAP, Kind.SCENARIO)]
+    records = [path for path, kind in files.items() if kind in MOTIONS]
     # Archives and workspaces stand for themselves, other records for their folder
     whole = [path for path in loose if _is_bundle(path)]
     single = [path for path in loose if path not in whole]

@@ -25,6 +25,7 @@ class Kind(StrEnum):
     EVENT_ID = "identifier of an earthquake"
     RECORDS = "records"
     SHAKEMAP = "ShakeMap grid"
+    STATION_LIST = "amplitudes of stations"
     EVENT = "description of an earthquake"
     STATIONS = "description of stations"
     PAIRS = "pair table"
@@ -36,7 +37,7 @@ class Kind(StrEnum):
 
 
 #: Kinds that a run takes for its records, and for its pairs.
-RECORD_KINDS = (Kind.RECORDS, Kind.SHAKEMAP, Kind.SCENARIO, Kind.EVENT_ID)
+RECORD_KINDS = (Kind.RECORDS, Kind.SHAKEMAP, Kind.STATION_LIST, Kind.SCENARIO, Kind.EVENT_ID)
 PAIR_KINDS = (Kind.PAIRS, Kind.FOOTPRINTS, Kind.CATALOG)
 
 #: Bytes at the beginning of a file by which it is recognised, and largest TOML that is read.
@@ -60,6 +61,7 @@ _WORDS = {
     b"quakeml": Kind.EVENT,
     b"shakemap_grid": Kind.SHAKEMAP,
     b"CityModel": Kind.FOOTPRINTS,
+    b'"commType"': Kind.STATION_LIST,
     b'"FeatureCollection"': Kind.FOOTPRINTS,
     b'"Feature"': Kind.FOOTPRINTS,
 }

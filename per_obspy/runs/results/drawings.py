@@ -12,9 +12,9 @@ from per_obspy.config import Run
 from per_obspy.report.page.drawings import HISTORY_COLUMNS, drawn_history, drawn_station
 from per_obspy.report.results import Drawings
 from per_obspy.runs.results.run_facts import read_stations
-from per_obspy.runs.screening import shakemap_files
+from per_obspy.runs.screening import ground_of_run
 from per_obspy.runs.stations import file_stem
-from per_obspy.runs.tasks.ground_files import ground_files, read_ground, read_station_once
+from per_obspy.runs.tasks.ground_files import read_ground, read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
@@ -119,7 +119,7 @@ def page_drawings(
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
-    ground, _ = ground_files(stations, shakemap_files(settings), settings.screening.interpolation)
+    ground, _ = ground_of_run(settings, stations)
     rows = _sensitivities(chosen, read_ground(ground), settings)
     counts = min(len(known), WORST), len(doubt)
     return Drawings(_station_drawings(worst, stations), histories, rows, *counts)

@@ -12,14 +12,17 @@ from per_obspy.config import Interpolation
 from per_obspy.errors import MachineFault, Rejection
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.records.shakemap import read_shakemap
+from per_obspy.records.station_list import read_station_list
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.assignment import Stations, site_class_of
 from per_obspy.screening.site_motion import (
+    Hypocentre,
     RegionalMotion,
     StationField,
     hypocentre_of,
     prepared_field,
 )
+from per_obspy.screening.station_amplitudes import AmplitudeField, amplitude_field
 from per_obspy.spectra.storage import read_spectra
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
@@ -69,16 +72,23 @@ class GroundFiles(NamedTuple):
         ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
     key : str
         Hash of all their contents.
+    amplitudes : AmplitudeField or None
+        The motion of stations of which only amplitudes are known; None if there are none.
     """
 
     stations: tuple[StationFile, ...]
     field: StationField | None
     shakemap: tuple[Path, ...]
     key: str
+    amplitudes: AmplitudeField | None = None
 
 
 def ground_files(
-    stations: Iterable[FinishedStation], shakemap: tuple[Path, ...], settings: Interpolation
+    stations: Iterable[FinishedStation],
+    shakemap: tuple[Path, ...],
+    settings: Interpolation,
+    amplitudes: Path | None = None,
+    event: Hypocentre | None = None,
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """
     Describe the ground motion by finished stations and a ShakeMap; no station file is opened.
@@ -91,12 +101,16 @@ def ground_files(
         Files of the ShakeMap, empty if there is none.
     settings : Interpolation
         For the motion between the stations.
+    amplitudes : Path, optional
+        List of stations of a ShakeMap, which is read.
+    event : Hypocentre, optional
+        Of the earthquake, where no station with a record knows it.
 
     Returns
     -------
     ground : GroundFiles
     rejected : tuple of Rejection
-        Stations without coordinates.
+        Stations without coordinates, and those of the list that are not used.
     """
     files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
     # Pairs are given stations by distance
@@ -115,8 +129,15 @@ def ground_files(
     # Everything that decides the motion at a pair
     contents = [(file.name, file.hash, file.flags) for file in files]
     known = [*contents, *map(file_hash, shakemap), hypocentre]
+    listed = None
+    if amplitudes is not None:
+        source = hypocentre or event
+        content = read_station_list(amplitudes)
+        listed, unused = amplitude_field(content, str(amplitudes), spectra, settings, source)
+        rejected += unused
+        known += [file_hash(amplitudes), source]
     key = bytes_hash(repr(known).encode())
-    return GroundFiles(tuple(files), field, shakemap, key), tuple(rejected)
+    return GroundFiles(tuple(files), field, shakemap, key, listed), tuple(rejected)
 
 
 def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
@@ -144,7 +165,7 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
         names, longitude, latitude, classes, lambda index: _flagged_station(files.stations[index])
     )
     shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
-    return RegionalMotion(stations, files.field, shakemap)
+    return RegionalMotion(stations, files.field, shakemap, files.amplitudes)
 
 
 @lru_cache(1)

@@ -59,8 +59,10 @@ def test_changes_go_into_the_settings(desk):
 def test_what_lies_beside_the_records_is_used(desk):
     (desk / "records" / "event.xml").write_text("<q:quakeml>")
     (desk / "records" / "grid.xml").write_text("<shakemap_grid>")
+    (desk / "records" / "list.json").write_text('{"commType": "FeatureCollection"}')
     found = requested_run("records", "pairs.csv").configuration.records
-    assert (found.event.name, found.shakemap.name) == ("event.xml", "grid.xml")
+    names = (found.event.name, found.shakemap.name, found.stationlist.name)
+    assert names == ("event.xml", "grid.xml", "list.json")
     # of two earthquakes none is chosen
     (desk / "records" / "other.xml").write_text("<q:quakeml>")
     assert requested_run("records", "pairs.csv").configuration.records.event is None
@@ -75,6 +77,9 @@ def test_other_sources_of_motion(desk):
     assert requested_run("scenario.toml").configuration.pairs is None
     settings = requested_run("grid.xml", "pairs.csv").configuration
     assert settings.records.shakemap == desk / "grid.xml"
+    (desk / "list.json").write_text('{"commType": "FeatureCollection"}')
+    settings = requested_run("list.json", "pairs.csv").configuration
+    assert settings.records.stationlist == desk / "list.json"
     settings = requested_run("GEONET:2016p858000", "pairs.csv", desk / "out").configuration
     fdsn = settings.records.fdsn
     assert (fdsn.event_provider, fdsn.event_id) == ("GEONET", "2016p858000")

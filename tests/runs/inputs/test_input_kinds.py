@@ -35,6 +35,9 @@ TEXTS = {
     ("latitude,longitude,area_in_meters,confidence,geometry\n", ".csv"): Kind.FOOTPRINTS,
     ("id,Longitude,Latitude,NumberOfStories\n", ".csv"): Kind.FOOTPRINTS,
     ('{"type": "FeatureCollection", "features": []}', ".geojson"): Kind.FOOTPRINTS,
+    ('{"type": "FeatureCollection", "features": [{"commType": "UNK"}]}', ".json"): (
+        Kind.STATION_LIST
+    ),
     ('<?xml version="1.0"?><FDSNStationXML>', ".xml"): Kind.STATIONS,
     ('<?xml version="1.0"?><q:quakeml>', ".xml"): Kind.EVENT,
     ('<?xml version="1.0"?><shakemap_grid>', ".xml"): Kind.SHAKEMAP,

@@ -1,0 +1,258 @@
+"""
+Amplitudes of stations without their records: ``stationlist.json`` of a ShakeMap.
+
+The list gives peaks and pseudo-spectral acceleration at 5 % damping and few periods, channel by
+channel, with flags of the agency. Intensities that people reported are in it too; they are counted
+and left out.
+"""
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.errors import CatalogError, Rejection, reason_of, shortened
+from per_obspy.names import SHOWN, code_problem
+
+#: Most bytes of a list: ten times one of ten thousand stations.
+LARGEST_FILE = 500_000_000
+
+#: Words of a list near its beginning, by which it is known from other GeoJSON.
+MARK = b'"commType"'
+
+#: Name of a spectral acceleration with its period, s.
+_SPECTRAL = re.compile(r"sa\((\d{1,2}(?:\.\d{1,4})?)\)", re.IGNORECASE)
+
+#: Quantity -> units of lists, with their factor to SI, and the largest plausible value in SI.
+_ACCELERATION = {"%g": STANDARD_GRAVITY / 100.0, "pctg": STANDARD_GRAVITY / 100.0}
+_UNITS: dict[str, tuple[dict[str, float], float]] = {
+    "sa": (_ACCELERATION, 20.0 * STANDARD_GRAVITY),
+    "pga": (_ACCELERATION, 20.0 * STANDARD_GRAVITY),
+    "pgv": ({"cm/s": 0.01}, 20.0),
+}
+
+#: Largest plausible spectral displacement, m: larger ones are in other units.
+_LARGEST_DISPLACEMENT = 20.0
+
+#: Flags of an amplitude without a doubt of the agency.
+_NO_DOUBT = ("", "0", "None", "null")
+
+#: Endings and names of vertical channels.
+_VERTICAL = re.compile(r".*Z|V|U|D|UP|UD|DOWN|VER(T|TICAL)?", re.IGNORECASE)
+
+#: Doubtful amplitudes that a station's warning names.
+_NAMED = 4
+
+
+class StationAmplitudes(NamedTuple):
+    """
+    Amplitudes of one station.
+
+    Attributes
+    ----------
+    name : str
+        ``NETWORK.STATION``.
+    longitude, latitude : float
+        Degrees east and north.
+    vs30 : float
+        m/s; NaN if unknown.
+    periods : tuple of float
+        s, rising, at least two.
+    displacements : tuple of float
+        Spectral displacement at 5 % damping, m, of the larger horizontal.
+    pga, pgv : float
+        Larger horizontal, m/s2 and m/s; NaN if unknown.
+    channels : tuple of str
+        Horizontals with an amplitude.
+    warnings : str
+        Amplitudes that are left out, with their flag, unit or value; horizontals that lack.
+    """
+
+    name: str
+    longitude: float
+    latitude: float
+    vs30: float
+    periods: tuple[float, ...]
+    displacements: tuple[float, ...]
+    pga: float
+    pgv: float
+    channels: tuple[str, ...]
+    warnings: str
+
+
+class StationList(NamedTuple):
+    """
+    Content of a list.
+
+    Attributes
+    ----------
+    stations : tuple of StationAmplitudes
+        In the order of the list.
+    rejected : tuple of Rejection
+        Stations that cannot be used, with their reasons.
+    intensities : int
+        Number of intensities that people reported, which are left out.
+    """
+
+    stations: tuple[StationAmplitudes, ...]
+    rejected: tuple[Rejection, ...]
+    intensities: int
+
+
+def read_station_list(path: Path) -> StationList:
+    """
+    Read the amplitudes of stations from a list.
+
+    Parameters
+    ----------
+    path : Path
+        ``stationlist.json`` of a ShakeMap.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read or is no list of stations.
+    """
+    stations, rejected, intensities = dict[str, StationAmplitudes](), list[Rejection](), 0
+    for number, feature in enumerate(_features(path), start=1):
+        facts = feature.get("properties") if isinstance(feature, dict) else None
+        if not isinstance(facts, dict):
+            reason = "is no station: it has no properties"
+            rejected.append(Rejection("record", f"feature {number}", str(path), None, (reason,)))
+            continue
+        if facts.get("station_type") == "macroseismic":
+            intensities += 1
+            continue
+        # Names become rows of tables; another station of the same name is not mixed with the first
+        codes = str(facts.get("network") or ""), str(facts.get("code") or "")
+        name = shortened(".".join(codes), SHOWN)
+        try:
+            if problem := code_problem(*codes) or (name in stations and "is in the list twice"):
+                raise ValueError(problem)
+            stations[name] = _station(name, feature, facts)
+        except ValueError as error:
+            reasons = (shortened(str(error)),)
+            rejected.append(Rejection("record", name, str(path), None, reasons))
+    return StationList(tuple(stations.values()), tuple(rejected), intensities)
+
+
+def _features(path: Path) -> list[Any]:
+    """Return the features of a list."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise CatalogError(str(path), f"cannot be read as JSON: {reason_of(error)}") from error
+    features = content.get("features") if isinstance(content, dict) else None
+    if not isinstance(features, list):
+        raise CatalogError(str(path), "is no list of stations: it has no features")
+    return features
+
+
+def _station(name: str, feature: Mapping[str, Any], facts: Mapping[str, Any]) -> StationAmplitudes:
+    """Return a station with at least two periods; ``ValueError`` says why it cannot be used."""
+    geometry = feature.get("geometry")
+    place = geometry.get("coordinates") if isinstance(geometry, dict) else None
+    place = place[:2] if isinstance(place, list) else []
+    longitude, latitude = map(_number, place) if len(place) == 2 else (math.nan, math.nan)
+    if not (abs(longitude) <= 180.0 and abs(latitude) <= 90.0):
+        raise ValueError(f"coordinates = {place} are not longitude and latitude in degrees")
+    if longitude == latitude == 0.0:
+        raise ValueError("coordinates = 0, 0 are a placeholder")
+    known, doubts = _horizontals(facts.get("channels"))
+    # The larger of the horizontals, at every period
+    largest = {key: max(of_channels.values()) for key, of_channels in known.items()}
+    periods = sorted(key for key in largest if isinstance(key, float))
+    channels = sorted({channel for of_channels in known.values() for channel in of_channels})
+    if len(periods) < 2:
+        listed = ", ".join(f"{period:g} s" for period in periods) or "no period"
+        problem = f"has spectral acceleration at {listed}, two are needed"
+        raise ValueError("; ".join([problem, *_shown(doubts)]))
+    single = [f"{period:g} s" for period in periods if len(known[period]) < len(channels)]
+    if single:
+        doubts.append(f"one horizontal at {', '.join(single)}")
+    # SD = PSA (T / 2 pi)^2
+    displacements = [largest[period] * (period / (2.0 * math.pi)) ** 2 for period in periods]
+    if max(displacements) > _LARGEST_DISPLACEMENT:
+        raise ValueError(f"spectral displacement = {max(displacements):.3g} m: in other units?")
+    vs30 = _number(facts.get("vs30"))
+    return StationAmplitudes(
+        name,
+        longitude,
+        latitude,
+        vs30 if 10.0 <= vs30 <= 10_000.0 else math.nan,
+        tuple(periods),
+        tuple(displacements),
+        largest.get("pga", math.nan),
+        largest.get("pgv", math.nan),
+        tuple(channels),
+        "; ".join(_shown(doubts)),
+    )
+
+
+#: Amplitudes in SI by channel, of every period (s) and peak.
+_Amplitudes = dict[float | str, dict[str, float]]
+
+
+def _horizontals(channels: object) -> tuple[_Amplitudes, list[str]]:
+    """Return the amplitudes of all horizontals, and sentences on those that are left out."""
+    known, doubts = _Amplitudes(), list[str]()
+    for channel in channels if isinstance(channels, list) else ():
+        if not isinstance(channel, dict):
+            continue
+        code = shortened(str(channel.get("name") or "UNK"), SHOWN)
+        amplitudes = channel.get("amplitudes")
+        if _VERTICAL.fullmatch(code) or not isinstance(amplitudes, list):
+            continue
+        for amplitude in amplitudes:
+            if not isinstance(amplitude, dict) or amplitude.get("value") in (None, "null"):
+                continue
+            try:
+                key, value = _amplitude(amplitude)
+                known.setdefault(key, {})[code] = value
+            except ValueError as error:
+                doubts.append(f"{code} {error}")
+            except LookupError:
+                continue  # of another kind: intensities, durations
+    return known, doubts
+
+
+def _amplitude(amplitude: Mapping[str, Any]) -> tuple[float | str, float]:
+    """
+    Return period or name of an amplitude, and its value in SI.
+
+    ``ValueError`` says why it cannot be used, ``KeyError`` that it is of another kind.
+    """
+    name = str(amplitude.get("name")).lower()
+    spectral = _SPECTRAL.fullmatch(name)
+    units, limit = _UNITS["sa" if spectral else name]
+    flag, unit = str(amplitude.get("flag", "")), str(amplitude.get("units"))
+    if flag not in _NO_DOUBT:
+        raise ValueError(f"{name}: flag {shortened(flag, SHOWN)}")
+    if unit not in units:
+        raise ValueError(f"{name}: unit {shortened(unit, SHOWN)!r}, expected {', '.join(units)}")
+    value = _number(amplitude["value"]) * units[unit]
+    if not 0.0 < value <= limit:
+        raise ValueError(f"{name} = {shortened(str(amplitude['value']), SHOWN)} {unit}")
+    period = float(spectral[1]) if spectral else 0.0
+    if spectral and not period > 0.0:
+        raise ValueError(f"{name}: the period must be positive")
+    return (period, value) if spectral else (name, value)
+
+
+def _number(value: object) -> float:
+    """Return a number of JSON, NaN for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    # Digits without end are an integer in JSON
+    return float(value) if abs(value) < 1e300 else math.nan
+
+
+def _shown(doubts: list[str]) -> list[str]:
+    """Return the first sentences of many."""
+    rest = len(doubts) - _NAMED
+    return [*doubts[:_NAMED], *([f"{rest} more amplitudes left out"] if rest > 0 else [])]
