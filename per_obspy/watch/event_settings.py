@@ -11,6 +11,7 @@ from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress
 from per_obspy.records.fdsn.providers import ROUTERS, base_url
+from per_obspy.watch.notified_run import check_groups
 from per_obspy.watch.relevance import Places
 from per_obspy.watch.state import EventState, moment
 
@@ -88,6 +89,7 @@ def read_settings(file: Path) -> Run:
         placed["settle"] = records.get("settle", SETTLE)
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
+    check_groups(settings)
     _require_services(file, settings.watch, settings.records.fdsn if settings.records else None)
     return settings
 
