@@ -31,30 +31,19 @@ OF_ONE_WINDOW = ("event_id", "shakemap_version", "start", "end", "latitude", "lo
 
 
 class Watcher(NamedTuple):
-    """
-    Settings and state that the runs of all earthquakes share.
+    """Settings and state that the runs of all earthquakes share."""
 
-    Attributes
-    ----------
-    settings : Run
-        With a section ``watch``.
-    folder : Path
-        Watched folder.
-    places : Places
-        Of the inventory.
-    now : callable
-        Returns the time, with its zone.
-    progress : callable
-        Called for every stage of a run.
-    executor : Executor or None
-        Where stations and chunks are done, if not in processes of this machine.
-    """
-
+    #: With a section ``watch``.
     settings: Run
+    #: Watched folder.
     folder: Path
+    #: Of the inventory.
     places: Places
+    #: Returns the time, with its zone.
     now: Callable[[], datetime]
+    #: Called for every stage of a run.
     progress: Progress
+    #: Where stations and chunks are done, if not in processes of this machine.
     executor: Executor | None
 
     @property

@@ -54,37 +54,22 @@ def utc_now() -> datetime:
 
 
 class Clock(NamedTuple):
-    """
-    Time and waiting, which tests replace.
+    """Time and waiting, which tests replace."""
 
-    Attributes
-    ----------
-    now : callable
-        Returns the time, with its zone.
-    wait : callable
-        Waits for some seconds, and returns whether the program shall end.
-    """
-
+    #: Returns the time, with its zone.
     now: Callable[[], datetime] = utc_now
+    #: Waits for some seconds, and returns whether the program shall end.
     wait: Callable[[float], bool] = termination.pause
 
 
 class Pass(NamedTuple):
-    """
-    Outcome of one pass.
+    """Outcome of one pass."""
 
-    Attributes
-    ----------
-    errors : tuple of PerError
-        Why the list could not be read, and the failure of each earthquake.
-    open_events : int
-        Number of earthquakes with runs to come.
-    next_due : datetime
-        Time of the next poll or run.
-    """
-
+    #: Why the list could not be read, and the failure of each earthquake.
     errors: tuple[PerError, ...]
+    #: Number of earthquakes with runs to come.
     open_events: int
+    #: Time of the next poll or run.
     next_due: datetime
 
 
