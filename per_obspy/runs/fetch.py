@@ -20,21 +20,13 @@ CHANNELS = ("HN?", "HL?", "BN?", "BL?", "CN?", "EN?")
 
 
 class FetchResult(NamedTuple):
-    """
-    Result of fetching the records of a configuration.
+    """Result of fetching the records of a configuration."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where the records are.
-    stations : list of str
-        ``"NET.STA"`` of those with records.
-    rejected : tuple of Rejection
-        Records that could not be fetched or read, each with its reasons.
-    """
-
+    #: Where the records are.
     folder: Path
+    #: ``"NET.STA"`` of those with records.
     stations: list[str]
+    #: Records that could not be fetched or read, each with its reasons.
     rejected: tuple[Rejection, ...]
 
 
@@ -69,34 +61,22 @@ def fetch_configured(
 
 
 class FetchedEvent(NamedTuple):
-    """
-    Records of a named earthquake.
+    """Records of a named earthquake."""
 
-    Attributes
-    ----------
-    provider, event_id : str
-        Event service, and the earthquake as it names it.
-    event : Path
-        QuakeML file.
-    folder : Path
-        With MiniSEED and StationXML of every station.
-    stations : list of str
-        ``"NET.STA"`` of those with records.
-    rejected : tuple of Rejection
-        Records that could not be fetched or read, each with its reasons.
-    records : Records
-        Section ``[records]`` of a configuration that reads all of this without the network.
-    shakemap : ShakeMapFiles or None
-        ShakeMap, if it was asked for and there is one.
-    """
-
+    #: Event service, and the earthquake as it names it.
     provider: str
     event_id: str
+    #: QuakeML file.
     event: Path
+    #: With MiniSEED and StationXML of every station.
     folder: Path
+    #: ``"NET.STA"`` of those with records.
     stations: list[str]
+    #: Records that could not be fetched or read, each with its reasons.
     rejected: tuple[Rejection, ...]
+    #: Section ``[records]`` of a configuration that reads all of this without the network.
     records: Records
+    #: ShakeMap, if it was asked for and there is one.
     shakemap: ShakeMapFiles | None
 
 
