@@ -141,8 +141,12 @@ def _print_map(source: str, found: "ShakeMapFiles | None") -> None:
     if found is None:
         print(f"{source} has no ShakeMap yet: ask again later", file=sys.stderr)
         return
-    names = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
-    names |= {"stationlist": found.stations}
+    # Keys of the configuration
+    names = {
+        "shakemap": found.grid,
+        "shakemap_uncertainty": found.uncertainty,
+        "stationlist": found.stations,
+    }
     options = " ".join(f"--set records.{name}={path}" for name, path in names.items() if path)
     print(f"ShakeMap, version {found.version}: per-obspy run ... {options}", file=sys.stderr)
 

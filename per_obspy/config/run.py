@@ -83,7 +83,18 @@ class Run(Section):
 class Design(Section):
     """A screening by a design or user spectrum instead of records."""
 
-    spectrum: RelativePath = Field(description="CSV: period (s), damping, and sd (m) or psa (m/s2)")
+    spectrum: RelativePath = Field(
+        description=(
+            "CSV: period (s), damping, and sd (m) or psa (m/s2); or uniform hazard spectra of "
+            "OpenQuake"
+        )
+    )
+    target_rate: float = Field(
+        1.0 / 475.0,
+        gt=0,
+        le=1,
+        description="annual rate of contact that is accepted, 1/year; of uniform hazard spectra",
+    )
     pairs: RelativePath = Field(description="pair table, CSV or Parquet")
     output: RelativePath = Field(description="folder of the results")
     building: Building = Building()
