@@ -57,7 +57,9 @@ def test_no_rows_are_no_loss():
 
 def test_a_table_without_names_of_pairs_counts_rows_with_a_line():
     # would catch a screening by a spectrum that ends without a result where a pair is left out
-    table = pa.table({"longitude_1": ["20"], "latitude_1": ["10"], "longitude_2": ["20"]})
+    table = pa.table(
+        {"longitude_1": ["20"], "latitude_1": ["10"], "longitude_2": ["20"], "latitude_2": ["10"]}
+    )
     rows = RawRows("pairs.csv", table, np.array([2]), ())
     rejected = [Rejection("pair", "line 2", "", None, ("too far",))]
     assert areas_left_out(Totals(), rejected, rows) == {}
