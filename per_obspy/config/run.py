@@ -55,9 +55,20 @@ class Run(Section):
     geopackage: bool = Field(
         False, description="write risk.gpkg, risk.qgz and GeoParquet; needs per_obspy[gis]"
     )
+    pmtiles: bool = Field(
+        False,
+        description="write risk_pairs.pmtiles and risk_buildings.pmtiles too, vector tiles for "
+        "maps on the web; needs geopackage = true",
+    )
     spreadsheet: bool = Field(
         False, description="write risk.xlsx too; needs per_obspy[spreadsheet]"
     )
+
+    @model_validator(mode="after")
+    def _tiles_of_layers(self) -> Self:
+        if self.pmtiles and not self.geopackage:
+            raise ValueError("pmtiles needs geopackage = true: tiles are made of its layers")
+        return self
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
