@@ -143,7 +143,19 @@ def _with_pairs(
         results = read_table(
             results, reader, table.pieces(), folder, outlines, settings.geopackage, report
         )
-        return results, reader
+    if settings.pmtiles:
+        _write_tiles(folder / "risk.gpkg", report)
+    return results, reader
+
+
+def _write_tiles(package: Path, report: Report) -> None:
+    """Write the layers of a GeoPackage as vector tiles, with the optional libraries."""
+    from per_obspy.report.layers.tiles import tile_files, write_tiles
+
+    # A GeoPackage that could not be written is a fault already
+    for layer, path in tile_files(package).items() if package in report.outputs else ():
+        with report.tried(path):
+            write_tiles(package, layer, path)
 
 
 def _results_of_run(

@@ -11,6 +11,7 @@ import pandas as pd
 from per_obspy.config import Design, Ensemble
 from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.errors import CatalogError
+from per_obspy.report.hazard_figure import draw_gaps_for_target
 from per_obspy.report.page.document import write_page
 from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.texts import LANGUAGES
@@ -28,6 +29,7 @@ from per_obspy.runs.results.report_files import (
     write_overview,
 )
 from per_obspy.runs.results.scenario_runs import ScenarioRuns
+from per_obspy.screening.columns import HAZARD
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import pounding_state, risk_class
@@ -67,14 +69,28 @@ def report_design(
     source = [texts["spectrum"].format(name=spectrum)]
     results = Results(
         "design", region, coverage, language, Revision(), source,
-        own=list(DESIGN), class_limits=settings.screening.classes,
+        own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
         provenance=[made_with(language), content_note([texts["page_design"]], language)],
     )  # fmt: skip
     reader, outlines = (
         TableReader(classes, settings.totals, len(table)),
         outlines_beside(settings.pairs),
     )
-    return _write(settings, results, reader, iter([_with_flags(table)]), folder, outlines)
+    return _with_gaps_for_target(
+        _write(settings, results, reader, iter([_with_flags(table)]), folder, outlines),
+        settings, table, folder,
+    )  # fmt: skip
+
+
+def _with_gaps_for_target(
+    report: Report, settings: Design, table: pd.DataFrame, folder: Path
+) -> Report:
+    """Draw the gaps for the target rate of a hazard, where the table has them."""
+    figure = folder / "figures" / "gap_for_target.png"
+    if "gap_for_target" in table:
+        with report.tried(figure):
+            draw_gaps_for_target(table, settings.target_rate, figure)
+    return report
 
 
 def _with_flags(table: pd.DataFrame) -> pd.DataFrame:
