@@ -63,6 +63,7 @@ WARNINGS = {
     "implausible_record": "with an implausible record",
     "assumed_corners": "with assumed corners",
     "digitised": "digitised from film",
+    "nominal_sensitivity": "with a nominal sensitivity only",
     "undated": "without a date",
     "contradicting_coordinates": "with contradicting coordinates",
     "implausible_amplitude": "with an implausible amplitude",

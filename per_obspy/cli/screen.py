@@ -52,6 +52,9 @@ SPECTRUM_COLUMNS = (
     "probability",
     "expected_impact_velocity",
 )
+
+#: Those by a seismic hazard.
+HAZARD_COLUMNS = (*SPECTRUM_COLUMNS[:5], "gap_for_target", "state", "annual_probability")
 ENSEMBLE_COLUMNS = (
     "rank",
     "pair_id",
@@ -147,14 +150,19 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.report.page.background import require_background
     from per_obspy.runs.inputs.extras import require_extras
     from per_obspy.screening.design import design_table, read_design_spectrum
+    from per_obspy.screening.hazard import hazard_table, is_hazard, read_hazard
 
     # Screen
     settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     require_background(settings.report.background)
-    spectrum = read_design_spectrum(settings.spectrum)
-    pairs = read_pairs(settings.pairs)
-    table = design_table(spectrum, pairs, settings.building, settings.screening)
+    # By the hazard of many motions, or by one spectrum
+    pairs, given = read_pairs(settings.pairs), (settings.building, settings.screening)
+    if is_hazard(settings.spectrum):
+        hazard = read_hazard(settings.spectrum)
+        table = hazard_table(hazard, pairs, *given, settings.target_rate)
+    else:
+        table = design_table(read_design_spectrum(settings.spectrum), pairs, *given)
     coverage = _coverage(settings, table)
     files, alert = _write_design(settings, table, coverage, output or settings.output)
 
@@ -228,7 +236,9 @@ def _print_spectrum_result(
         f"{len(table)} pairs ({words}), {rejected} rejected; "
         "the radius is SD, a design spectrum has no PER"
     )
-    _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
+    # A hazard has its own gap
+    columns = HAZARD_COLUMNS if "gap_for_target" in table else SPECTRUM_COLUMNS
+    _print_worst(table.head(WORST), columns)
     folder = files[-1].parent
     print_files(folder, [path.relative_to(folder).as_posix() for path in files], "design")
 

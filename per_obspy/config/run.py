@@ -55,9 +55,20 @@ class Run(Section):
     geopackage: bool = Field(
         False, description="write risk.gpkg, risk.qgz and GeoParquet; needs per_obspy[gis]"
     )
+    pmtiles: bool = Field(
+        False,
+        description="write risk_pairs.pmtiles and risk_buildings.pmtiles too, vector tiles for "
+        "maps on the web; needs geopackage = true",
+    )
     spreadsheet: bool = Field(
         False, description="write risk.xlsx too; needs per_obspy[spreadsheet]"
     )
+
+    @model_validator(mode="after")
+    def _tiles_of_layers(self) -> Self:
+        if self.pmtiles and not self.geopackage:
+            raise ValueError("pmtiles needs geopackage = true: tiles are made of its layers")
+        return self
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -95,7 +106,18 @@ class Run(Section):
 class Design(Section):
     """A screening by a design or user spectrum instead of records."""
 
-    spectrum: RelativePath = Field(description="CSV: period (s), damping, and sd (m) or psa (m/s2)")
+    spectrum: RelativePath = Field(
+        description=(
+            "CSV: period (s), damping, and sd (m) or psa (m/s2); or uniform hazard spectra of "
+            "OpenQuake"
+        )
+    )
+    target_rate: float = Field(
+        1.0 / 475.0,
+        gt=0,
+        le=1,
+        description="annual rate of contact that is accepted, 1/year; of uniform hazard spectra",
+    )
     pairs: RelativePath = Field(description="pair table, CSV or Parquet")
     output: RelativePath = Field(description="folder of the results")
     building: Building = Building()

@@ -223,8 +223,8 @@ class Notify(AppriseUrls):
         (),
         description=(
             "program and arguments, started without a shell; the message is its standard "
-            "input, and PER_OBSPY_KIND, PER_OBSPY_TITLE, PER_OBSPY_FOLDER and "
-            "PER_OBSPY_REPORT are in its environment"
+            "input, and PER_OBSPY_KIND, PER_OBSPY_TITLE, PER_OBSPY_FOLDER, PER_OBSPY_REPORT, "
+            "PER_OBSPY_GROUP and PER_OBSPY_ADDRESS are in its environment"
         ),
     )
     groups: tuple[Group, ...] = Field(

@@ -109,6 +109,10 @@ KINDS = {
         "two sources place the station more than 1 km apart: see coordinates_conflict"
     ),
     "digitised": "digitised from film: short and long periods are less certain",
+    "nominal_sensitivity": (
+        "converted by an overall sensitivity alone, which may be that of the model: the metadata "
+        "have no stages of the response"
+    ),
     "undated": "the start time is unknown: it is not known of which earthquake the record is",
 }
 
@@ -300,9 +304,9 @@ def with_flags(trace: Trace) -> Trace:
 
     ``stats.per_obspy.record_flags`` may hold ``baseline_shift``, ``second_event``, ``clipped``,
     ``wrapped``, ``filled``, ``implausible_record``, ``assumed_corners``, ``record_warning``
-    (another check that warns), ``digitised``, ``undated`` and ``contradicting_coordinates``; it is
-    missing where there is none. The last three are in ``warnings`` too. Flags of an earlier
-    processing stay.
+    (another check that warns), ``digitised``, ``nominal_sensitivity``, ``undated`` and
+    ``contradicting_coordinates``; it is missing where there is none. The last four are in
+    ``warnings`` too. Flags of an earlier processing stay.
     """
     flags = record_flags(trace)
     if not flags:
@@ -334,6 +338,7 @@ def record_flags(trace: Trace) -> list[str]:
     kinds = {
         "contradicting_coordinates": stats.get("coordinates_conflict"),
         "digitised": stats.get("digitised"),
+        "nominal_sensitivity": account.get("conversion") == "sensitivity",
         "undated": (start.year, start.month, start.day) in UNSET_DAYS,
     }
     return sorted(flags | {name for name, is_so in kinds.items() if is_so})

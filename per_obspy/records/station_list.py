@@ -118,25 +118,31 @@ def read_station_list(path: Path) -> StationList:
     """
     stations, rejected, intensities = dict[str, StationAmplitudes](), list[Rejection](), 0
     for number, feature in enumerate(_features(path), start=1):
+        # Anything may stand in the place of a station
         facts = feature.get("properties") if isinstance(feature, dict) else None
-        if not isinstance(facts, dict):
-            reason = "is no station: it has no properties"
-            rejected.append(Rejection("record", f"feature {number}", str(path), None, (reason,)))
-            continue
+        facts = facts if isinstance(facts, dict) else {}
         if facts.get("station_type") == "macroseismic":
             intensities += 1
             continue
         # Names become rows of tables; another station of the same name is not mixed with the first
         codes = str(facts.get("network") or ""), str(facts.get("code") or "")
-        name = shortened(".".join(codes), SHOWN)
+        name = shortened(".".join(codes), SHOWN) if any(codes) else f"feature {number}"
         try:
-            if problem := code_problem(*codes) or (name in stations and "is in the list twice"):
-                raise ValueError(problem)
-            stations[name] = _station(name, feature, facts)
+            stations[name] = _named_station(name, codes, feature, facts, name in stations)
         except ValueError as error:
-            reasons = (shortened(str(error)),)
-            rejected.append(Rejection("record", name, str(path), None, reasons))
+            rejected.append(Rejection("record", name, str(path), None, (shortened(str(error)),)))
     return StationList(tuple(stations.values()), tuple(rejected), intensities)
+
+
+def _named_station(
+    name: str, codes: tuple[str, str], feature: Any, facts: Mapping[str, Any], is_known: bool
+) -> StationAmplitudes:
+    """Return a station whose codes can be used; ``ValueError`` says why it cannot be used."""
+    if not any(codes):
+        raise ValueError("is no station: it has no network and code")
+    if problem := code_problem(*codes) or ("is in the list twice" if is_known else ""):
+        raise ValueError(problem)
+    return _station(name, feature, facts)
 
 
 def _features(path: Path) -> list[Any]:
@@ -144,6 +150,7 @@ def _features(path: Path) -> list[Any]:
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
+        # Deep nesting and numbers of endless digits are errors too
         content = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
         raise CatalogError(str(path), f"cannot be read as JSON: {reason_of(error)}") from error
@@ -155,30 +162,20 @@ def _features(path: Path) -> list[Any]:
 
 def _station(name: str, feature: Mapping[str, Any], facts: Mapping[str, Any]) -> StationAmplitudes:
     """Return a station with at least two periods; ``ValueError`` says why it cannot be used."""
-    geometry = feature.get("geometry")
-    place = geometry.get("coordinates") if isinstance(geometry, dict) else None
-    place = place[:2] if isinstance(place, list) else []
-    longitude, latitude = map(_number, place) if len(place) == 2 else (math.nan, math.nan)
-    if not (abs(longitude) <= 180.0 and abs(latitude) <= 90.0):
-        raise ValueError(f"coordinates = {place} are not longitude and latitude in degrees")
-    if longitude == latitude == 0.0:
-        raise ValueError("coordinates = 0, 0 are a placeholder")
+    longitude, latitude = _place(feature)
     known, doubts = _horizontals(facts.get("channels"))
     # The larger of the horizontals, at every period
     largest = {key: max(of_channels.values()) for key, of_channels in known.items()}
-    periods = sorted(key for key in largest if isinstance(key, float))
+    periods = _periods(largest, doubts)
+    # One horizontal alone may be the smaller one
     channels = sorted({channel for of_channels in known.values() for channel in of_channels})
-    if len(periods) < 2:
-        listed = ", ".join(f"{period:g} s" for period in periods) or "no period"
-        problem = f"has spectral acceleration at {listed}, two are needed"
-        raise ValueError("; ".join([problem, *_shown(doubts)]))
-    single = [f"{period:g} s" for period in periods if len(known[period]) < len(channels)]
-    if single:
-        doubts.append(f"one horizontal at {', '.join(single)}")
-    # SD = PSA (T / 2 pi)^2
-    displacements = [largest[period] * (period / (2.0 * math.pi)) ** 2 for period in periods]
-    if max(displacements) > _LARGEST_DISPLACEMENT:
-        raise ValueError(f"spectral displacement = {max(displacements):.3g} m: in other units?")
+    doubts += [
+        f"one horizontal at {period:g} s"
+        for period in periods
+        if len(known[period]) < len(channels)
+    ]
+    # As they are used
+    displacements = _displacements({period: largest[period] for period in periods})
     vs30 = _number(facts.get("vs30"))
     return StationAmplitudes(
         name,
@@ -186,12 +183,45 @@ def _station(name: str, feature: Mapping[str, Any], facts: Mapping[str, Any]) ->
         latitude,
         vs30 if 10.0 <= vs30 <= 10_000.0 else math.nan,
         tuple(periods),
-        tuple(displacements),
+        displacements,
         largest.get("pga", math.nan),
         largest.get("pgv", math.nan),
         tuple(channels),
         "; ".join(_shown(doubts)),
     )
+
+
+def _periods(amplitudes: Mapping[float | str, float], doubts: list[str]) -> list[float]:
+    """Return the periods of spectral accelerations, rising, s: two at least."""
+    periods = sorted(key for key in amplitudes if isinstance(key, float))
+    if len(periods) < 2:
+        listed = ", ".join(f"{period:g} s" for period in periods) or "no period"
+        problem = f"has spectral acceleration at {listed}, two are needed"
+        raise ValueError("; ".join([problem, *_shown(doubts)]))
+    return periods
+
+
+def _place(feature: Mapping[str, Any]) -> tuple[float, float]:
+    """Return longitude and latitude of a station, degrees."""
+    geometry = feature.get("geometry")
+    place = geometry.get("coordinates") if isinstance(geometry, dict) else None
+    place = place[:2] if isinstance(place, list) else []
+    longitude, latitude = map(_number, place) if len(place) == 2 else (math.nan, math.nan)
+    # NaN is not within any limit
+    if not (abs(longitude) <= 180.0 and abs(latitude) <= 90.0):
+        shown = shortened(str(place), SHOWN)
+        raise ValueError(f"coordinates = {shown} are not longitude and latitude in degrees")
+    if longitude == latitude == 0.0:
+        raise ValueError("coordinates = 0, 0 are a placeholder")
+    return longitude, latitude
+
+
+def _displacements(acceleration: Mapping[float, float]) -> tuple[float, ...]:
+    """Return SD = PSA (T / 2 pi)^2 of every period, m."""
+    found = tuple(psa * (period / (2.0 * math.pi)) ** 2 for period, psa in acceleration.items())
+    if max(found) > _LARGEST_DISPLACEMENT:
+        raise ValueError(f"spectral displacement = {max(found):.3g} m: in other units?")
+    return found
 
 
 #: Amplitudes in SI by channel, of every period (s) and peak.
@@ -227,19 +257,20 @@ def _amplitude(amplitude: Mapping[str, Any]) -> tuple[float | str, float]:
 
     ``ValueError`` says why it cannot be used, ``KeyError`` that it is of another kind.
     """
-    name = str(amplitude.get("name")).lower()
+    name, unit = str(amplitude.get("name")).lower(), str(amplitude.get("units"))
     spectral = _SPECTRAL.fullmatch(name)
     units, limit = _UNITS["sa" if spectral else name]
-    flag, unit = str(amplitude.get("flag", "")), str(amplitude.get("units"))
-    if flag not in _NO_DOUBT:
+    # Flag, unit and value, in this order
+    if (flag := str(amplitude.get("flag", ""))) not in _NO_DOUBT:
         raise ValueError(f"{name}: flag {shortened(flag, SHOWN)}")
     if unit not in units:
         raise ValueError(f"{name}: unit {shortened(unit, SHOWN)!r}, expected {', '.join(units)}")
     value = _number(amplitude["value"]) * units[unit]
     if not 0.0 < value <= limit:
         raise ValueError(f"{name} = {shortened(str(amplitude['value']), SHOWN)} {unit}")
-    period = float(spectral[1]) if spectral else 0.0
-    if spectral and not period > 0.0:
+    period = float(spectral[1]) if spectral else math.inf
+    # A period of 0 is the peak under another name
+    if not period > 0.0:
         raise ValueError(f"{name}: the period must be positive")
     return (period, value) if spectral else (name, value)
 

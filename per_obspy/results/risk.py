@@ -30,7 +30,7 @@ from per_obspy.results.table_files import (
     write_parquet,
     write_rejected,
 )
-from per_obspy.screening.columns import column_table, csv_columns
+from per_obspy.screening.columns import HAZARD, column_table, csv_columns
 from per_obspy.screening.design import DESIGN
 
 
@@ -217,7 +217,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     odd = Column(ODD, "str", "", "what is odd in the row: flags of docs/inventories.md")
-    names, own = list(map(str, table)), DESIGN | {ODD: odd}
+    names, own = list(map(str, table)), DESIGN | HAZARD | {ODD: odd}
     short = table[csv_columns(names)]
     # A reader finds a place in every row
     place = with_towns(short["place"], short["longitude"], short["latitude"])

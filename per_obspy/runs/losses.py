@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from per_obspy.config import Pairs, Run, Totals
 from per_obspy.errors import Rejection
@@ -93,12 +94,7 @@ def areas_left_out(totals: Totals, rejected: Sequence[Rejection], rows: RawRows)
     """
     if not rejected:
         return {}
-    lines = [rejection.row for rejection in rejected if rejection.row is not None]
-    lost = np.isin(rows.lines, np.array(lines, dtype=np.int64))
-    # A row that is rejected after its checks has no line any more
-    names = {rejection.name for rejection in rejected if rejection.row is None}
-    if names:
-        lost |= [str(name).strip() in names for name in rows.table[IDENTIFIER].to_pylist()]
+    lost = _lost_rows(rejected, rows)
     # Cells as they were read, as numbers or as text
     known = rows.table.column_names
     columns = [f"{name}_{i}" for name in _PLACE for i in (1, 2)]
@@ -108,6 +104,17 @@ def areas_left_out(totals: Totals, rejected: Sequence[Rejection], rows: RawRows)
     if totals.area is None:
         return Counter(_cells_of(totals, table))
     return Counter(table[totals.area].fillna("").astype(str)) if totals.area in table else {}
+
+
+def _lost_rows(rejected: Sequence[Rejection], rows: RawRows) -> NDArray[np.bool_]:
+    """Return a mask of the rejected rows; a table without names knows those with a line."""
+    lines = [rejection.row for rejection in rejected if rejection.row is not None]
+    lost = np.isin(rows.lines, np.array(lines, dtype=np.int64))
+    # A row that is rejected after its checks has no line any more
+    names = {rejection.name for rejection in rejected if rejection.row is None}
+    if names and IDENTIFIER in rows.table.column_names:
+        lost |= [str(name).strip() in names for name in rows.table[IDENTIFIER].to_pylist()]
+    return lost
 
 
 def _cells_of(totals: Totals, table: pd.DataFrame) -> Sequence[str]:

@@ -103,6 +103,7 @@ class RunSettings:
         # The configuration stays as it was given: a later run may have another version
         if found := known_shakemap(fdsn):
             files = {"shakemap": found.grid, "shakemap_uncertainty": found.uncertainty}
+            files["stationlist"] = records.stationlist or found.stations
             update = {"records": records.model_copy(update=files)}
             self.settings = self.settings.model_copy(update=update)
 

@@ -27,6 +27,7 @@ from per_obspy.report.files import (
     with_areas,
     write_report,
 )
+from per_obspy.report.hazard_figure import draw_gaps_for_target
 from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.pair_figure import differing_pair
 from per_obspy.report.results import Drawings, Region, Results, Revision
@@ -44,6 +45,7 @@ from per_obspy.runs.stations import file_stem, simulated_motion
 from per_obspy.runs.tasks.ground_files import read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.runs.worst_pairs import page_drawings, read_drawings, write_drawings
+from per_obspy.screening.columns import HAZARD
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import pounding_state, risk_class
@@ -169,6 +171,18 @@ def _report_pairs(
         )  # fmt: skip
         results = replace(results, worst=worst, record=_record(worst, stations))
         write_report(results, pairs, folder, report)
+    if settings.pmtiles:
+        _write_tiles(folder / "risk.gpkg", report)
+
+
+def _write_tiles(package: Path, report: Report) -> None:
+    """Write the layers of a GeoPackage as vector tiles, with the optional libraries."""
+    from per_obspy.report.layers.tiles import tile_files, write_tiles
+
+    # A GeoPackage that could not be written is a fault already
+    for layer, path in tile_files(package).items() if package in report.outputs else ():
+        with report.tried(path):
+            write_tiles(package, layer, path)
 
 
 def worst_pairs(table: RankedTable, totals: Totals) -> pd.DataFrame:
@@ -250,15 +264,19 @@ def report_design(
     region = _region(texts["spectrum_title"].format(name=spectrum), classes, simulated=False)
     results = Results(
         "design", region, coverage, language, Revision(), [texts["spectrum"].format(name=spectrum)],
-        own=list(DESIGN), class_limits=settings.screening.classes,
+        own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
         provenance=[_made_with(texts), _content_note([texts["page_design"]], texts)],
     )  # fmt: skip
     pairs = PairTable(
         iter([_with_flags(table)]), len(table), settings.totals, outlines_beside(settings.pairs),
-        settings.report,
-        settings.geopackage, settings.spreadsheet,
+        settings.report, settings.geopackage, settings.spreadsheet,
     )  # fmt: skip
     write_report(results, pairs, folder, report)
+    # Gaps for the target rate of a hazard
+    figure = folder / "figures" / "gap_for_target.png"
+    if "gap_for_target" in table:
+        with report.tried(figure):
+            draw_gaps_for_target(table, settings.target_rate, figure)
     return report
 
 

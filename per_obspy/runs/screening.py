@@ -14,6 +14,7 @@ from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
 from per_obspy.records.earthquakes.quakeml import read_event_file
+from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.coverage import Coverage, CoverageTally
 from per_obspy.results.risk import RiskFiles, write_risk
 from per_obspy.results.table_files import write_rejected
@@ -74,6 +75,18 @@ class Screened(NamedTuple):
     coverage: Coverage
     #: Motion of stations of which only amplitudes are known.
     amplitudes: AmplitudeField | None = None
+    #: Rejections of the stages before.
+    earlier: tuple[Rejection, ...] = ()
+
+    @property
+    def left_out(self) -> list[Rejection]:
+        """Rejections of the stages before, and of stations that serve no pair."""
+        return [*self.earlier, *self.unplaced]
+
+    @property
+    def alone(self) -> tuple[StationAmplitudes, ...]:
+        """Stations of which only amplitudes are used."""
+        return self.amplitudes.stations if self.amplitudes else ()
 
 
 def screened(
@@ -121,6 +134,7 @@ def screened(
         notes,
         tally.coverage(counts),
         ground.amplitudes,
+        tuple(rejected),
     )
 
 

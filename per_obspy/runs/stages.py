@@ -169,9 +169,7 @@ def _later_stages(
     with timed(record.seconds, "screening"), record.with_engine(folder, executor):
         found = screened(context, usable, rejected)
         spectra = [station.spectra for station in usable if station.spectra is not None]
-        alone = found.amplitudes.stations if found.amplitudes else ()
-        left_out = [*rejected, *found.unplaced]
-        table = write_stations(spectra, left_out, found.served.pairs, folder, alone)
+        table = write_stations(spectra, found.left_out, found.served.pairs, folder, found.alone)
         worst = explained(context, usable)
     # Everything that is read from them
     with timed(record.seconds, "report"):

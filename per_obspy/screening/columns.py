@@ -278,6 +278,37 @@ ORDER = (
     "derived",
 )  # fmt: skip
 
+#: Columns that a seismic hazard gives beside those of a design spectrum.
+HAZARD: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column(
+            "annual_probability",
+            "float64",
+            "1",
+            "of pounding within a year by the hazard, earthquakes coming as a Poisson process",
+        ),
+        Column(
+            "annual_probability_bound",
+            "str",
+            "",
+            "at least: the pair also pounds in motions more frequent than those of the hazard file",
+        ),
+        Column(
+            "gap_for_target",
+            "float64",
+            "m",
+            "gap that contact exceeds with the annual rate of the configuration (target_rate)",
+        ),
+        Column(
+            "missing_gap_for_target",
+            "float64",
+            "m",
+            "widening to the gap_for_target; 0 if it is there",
+        ),
+    )
+}
+
 #: Columns of ``risk.csv`` and ``design.csv``, as far as the table has them; the rules of codes that
 #: were asked for follow.
 CSV_COLUMNS = (
@@ -302,13 +333,15 @@ BY_CONTACT = frozenset(
 def csv_columns(names: Iterable[str]) -> list[str]:
     """Return the columns of a table that its CSV file has, in their order."""
     known = list(names)
-    return [name for name in (*CSV_COLUMNS, *rule_columns()) if name in known]
+    return [name for name in (*CSV_COLUMNS, *HAZARD, *rule_columns()) if name in known]
 
 
 @cache
 def _known() -> dict[str, Column]:
     """Return every column that the package defines, by name."""
-    return COLUMNS | COMPLETED | RESULTS | rule_columns()
+    # probabilities in a year are those of an ensemble too
+    gaps = {name: column for name, column in HAZARD.items() if column.unit == "m"}
+    return COLUMNS | COMPLETED | RESULTS | rule_columns() | gaps
 
 
 def known_column(name: str) -> Column | None:

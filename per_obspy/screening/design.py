@@ -129,7 +129,14 @@ def _read(source: str) -> pd.DataFrame:
     except (OSError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise CatalogError(source, f"cannot be read as CSV: {reason_of(error)}") from error
     check_separator(Path(source), list(map(str, table.columns)))
+    require_header(table, source)
     return table
+
+
+def require_header(table: pd.DataFrame, source: str) -> None:
+    """Refuse a table whose rows have more fields than the header, which shifts them."""
+    if not isinstance(table.index, pd.RangeIndex):
+        raise CatalogError(source, "its rows have more fields than its header")
 
 
 def _positive(table: pd.DataFrame, name: str, source: str) -> FloatArray:

@@ -12,6 +12,7 @@ RECORD_FLAGS = (
     "implausible_record",
     "assumed_corners",
     "digitised",
+    "nominal_sensitivity",
     "undated",
     "contradicting_coordinates",
     "implausible_amplitude",
@@ -129,6 +130,10 @@ FLAGS: dict[str, str] = {
     ),
     "digitised": (
         "the station's record was digitised from film: short and long periods are less certain"
+    ),
+    "nominal_sensitivity": (
+        "the station's record was converted by an overall sensitivity alone, which may be that of "
+        "the model: the metadata have no stages of the response"
     ),
     "undated": (
         "the start time of the station's record is unknown: it may be of another earthquake"

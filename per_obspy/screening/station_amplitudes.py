@@ -29,7 +29,7 @@ from per_obspy.screening.site_motion import (
     places_of_pairs,
     with_source_distance,
 )
-from per_obspy.screening.values import BoolArray, both, number, values
+from per_obspy.screening.values import BoolArray, Both, both, number, values
 
 #: Distances within which a station of the list is one with a record, m: of any name, and of the
 #: same station code. Agencies round coordinates, and name networks in different ways.
@@ -100,36 +100,38 @@ def amplitude_field(
     rejected : tuple of Rejection
         Stations of the list that cannot be used, and those with a record, which wins.
     """
+    alone, rejected = _without_record(listed, source, records)
+    if not alone:
+        return None, rejected
+    given = np.unique(np.concatenate([station.periods for station in alone]))
+    periods = _grid(given)
+    # Stations of the list, and those with a record as far as they moved
+    known = [*map(_of_amplitudes, alone), *map(_of_record, records)]
+    # As PER between records
+    moving = [one for one in known if np.isfinite(one.ln_sd).all()]
+    longitude, latitude, vs30 = np.array([one.place for one in moving]).T
+    located = with_source_distance(hypocentre, sites(longitude, latitude, vs30=vs30))
+    ln_sd = [np.interp(np.log(periods), np.log(one.periods), one.ln_sd) for one in moving]
+    usable = [one.usable for one in moving]
+    field = fitted_field(located, ln_sd, usable, periods, settings)
+    shape = _shape_std(given, periods)
+    return AmplitudeField(tuple(alone), field, hypocentre, shape, listed.intensities), rejected
+
+
+def _without_record(
+    listed: StationList, source: str, records: Sequence[xr.Dataset]
+) -> tuple[list[StationAmplitudes], tuple[Rejection, ...]]:
+    """Return the stations of a list that have no record, and the rejections of the others."""
     alone, recorded = list[StationAmplitudes](), list[Rejection]()
     for station in listed.stations:
         record = _record_of(station, records)
+        # A record is the better source
         if record is None:
             alone.append(station)
         else:
             reason = f"its amplitudes are not needed: {record} has a record there"
             recorded.append(Rejection("record", station.name, source, None, (reason,)))
-    rejected = (*listed.rejected, *recorded)
-    if not alone:
-        return None, rejected
-    given = np.array(sorted({period for station in alone for period in station.periods}))
-    periods = _grid(given)
-    ln_sd = [_ln_sd(station.periods, np.log(station.displacements), periods) for station in alone]
-    usable = [(station.periods[0], station.periods[-1]) for station in alone]
-    places = [(station.longitude, station.latitude, station.vs30) for station in alone]
-    # Stations with a record, as far as they moved
-    for dataset in records:
-        horizontals = np.asarray(dataset["sd"][: int(dataset.attrs["horizontals"])]).max(axis=0)
-        ln_record = ln_at_reference_damping(dataset, horizontals)
-        if np.isfinite(ln_record).all():
-            ln_sd.append(_ln_sd(dataset["period"].to_numpy(), ln_record, periods))
-            usable.append(_usable(dataset))
-            vs30 = number(dataset, "vs30") if "vs30" in dataset else np.nan
-            places.append((number(dataset, "longitude"), number(dataset, "latitude"), vs30))
-    longitude, latitude, vs30s = np.array(places).T
-    located = with_source_distance(hypocentre, sites(longitude, latitude, vs30=vs30s))
-    field = fitted_field(located, np.array(ln_sd), np.array(usable), periods, settings)
-    shape = _shape_std(given, periods)
-    return AmplitudeField(tuple(alone), field, hypocentre, shape, listed.intensities), rejected
+    return alone, (*listed.rejected, *recorded)
 
 
 def _record_of(station: StationAmplitudes, records: Iterable[xr.Dataset]) -> str | None:
@@ -138,6 +140,7 @@ def _record_of(station: StationAmplitudes, records: Iterable[xr.Dataset]) -> str
     for dataset in records:
         name = str(dataset["station"].item())
         place = number(dataset, "longitude"), number(dataset, "latitude")
+        # Networks are named in different ways
         apart = float(great_circle(station.longitude, station.latitude, *place))
         is_named = name.partition(".")[2] == code and apart <= SAME_CODE
         if name == station.name or is_named or apart <= SAME_PLACE:
@@ -145,11 +148,37 @@ def _record_of(station: StationAmplitudes, records: Iterable[xr.Dataset]) -> str
     return None
 
 
-def _usable(station: xr.Dataset) -> tuple[float, float]:
-    """Return the usable periods of a record, s."""
-    return (
-        number(station, "shortest_usable_period"),
-        number(station, "longest_usable_period"),
+class _KnownMotion(NamedTuple):
+    """Motion of a station: longitude, latitude and Vs30, usable periods in s, ln SD in m."""
+
+    place: tuple[float, float, float]
+    usable: tuple[float, float]
+    periods: FloatArray
+    ln_sd: FloatArray
+
+
+def _of_amplitudes(station: StationAmplitudes) -> _KnownMotion:
+    """Return the motion of a station of a list."""
+    return _KnownMotion(
+        (station.longitude, station.latitude, station.vs30),
+        (station.periods[0], station.periods[-1]),
+        np.array(station.periods),
+        np.log(station.displacements),
+    )
+
+
+def _of_record(station: xr.Dataset) -> _KnownMotion:
+    """Return the motion of a station with a record: SD at 5 % damping of the larger horizontal."""
+    horizontals = np.asarray(station["sd"][: int(station.attrs["horizontals"])])
+    vs30 = number(station, "vs30") if "vs30" in station else np.nan
+    # Usable periods as those of a list
+    ends = (number(station, f"{end}_usable_period") for end in ("shortest", "longest"))
+    shortest, longest = ends
+    return _KnownMotion(
+        (number(station, "longitude"), number(station, "latitude"), vs30),
+        (shortest, longest),
+        station["period"].to_numpy(),
+        ln_at_reference_damping(station, horizontals.max(axis=0)),
     )
 
 
@@ -160,14 +189,6 @@ def _grid(given: FloatArray) -> FloatArray:
         count = int(np.ceil(np.log(high / low) / np.log(STEP)))
         parts.append(np.geomspace(low, high, count + 1)[:-1])
     return np.sort(np.concatenate(parts))
-
-
-def _ln_sd(
-    known: Sequence[float] | FloatArray, ln_sd: FloatArray, periods: FloatArray
-) -> FloatArray:
-    """Interpolate ln SD in ln period; periods beyond the known ones are not used."""
-    interpolated: FloatArray = np.interp(np.log(periods), np.log(known), ln_sd)
-    return interpolated
 
 
 def _shape_std(given: FloatArray, periods: FloatArray) -> FloatArray:
@@ -205,25 +226,36 @@ def amplitudes_in_reach(
     by_range: dict[tuple[float, float], list[StationAmplitudes]] = {}
     for station in amplitudes.stations:
         by_range.setdefault((station.periods[0], station.periods[-1]), []).append(station)
+    # Stations whose periods hold both of the pair
     for (first, last), stations in by_range.items():
-        places = np.array([(station.longitude, station.latitude) for station in stations]).T
-        _, apart = nearest_station(east, north, *places)
+        apart = _to_nearest(stations, east, north)
         covered = (shortest >= first) & (longest <= last)
         distance = np.where(covered, np.minimum(distance, apart), distance)
-    first, last = amplitudes.field.periods[[0, -1]]
-    return AmplitudesInReach(
-        distance,
-        [
-            _reason(apart, periods, (first, last), reach)
-            for apart, periods in zip(distance, zip(shortest, longest, strict=True), strict=True)
-        ],
-    )
+    return AmplitudesInReach(distance, _reasons(distance, (shortest, longest), amplitudes, reach))
+
+
+def _reasons(
+    distance: FloatArray, periods: Both, amplitudes: AmplitudeField, reach: float
+) -> list[str]:
+    """Return why no amplitudes serve a pair, empty where they do."""
+    span = amplitudes.field.periods[[0, -1]]
+    facts = zip(distance.tolist(), *(period.tolist() for period in periods), strict=True)
+    return [_reason(apart, (low, high), tuple(span), reach) for apart, low, high in facts]
+
+
+def _to_nearest(
+    stations: Sequence[StationAmplitudes], east: FloatArray, north: FloatArray
+) -> FloatArray:
+    """Return the distance of places, degrees, to the nearest station, m."""
+    places = np.array([(station.longitude, station.latitude) for station in stations]).T
+    return nearest_station(east, north, *places)[1]
 
 
 def _reason(
     distance: float, periods: tuple[float, float], known: tuple[float, float], reach: float
 ) -> str:
     """Return why no amplitudes serve a pair, empty if they do."""
+    # Near enough is no reason
     if np.isfinite(distance):
         near = f"nearest amplitudes are {distance:.0f} m away, beyond {reach:.0f} m"
         return near if distance > reach else ""
@@ -253,6 +285,7 @@ def amplitude_rows(
     ln_sd = np.stack([motion.ln_median for motion in motions], axis=1)
     between = np.stack([motion.log_std for motion in motions], axis=1)
     log_std = np.hypot(between, amplitudes.shape_std)
+    # By this motion as under a ShakeMap
     every = np.ones(len(pairs), dtype=bool)
     motion = MapMotion(periods, ln_sd, log_std)
     return mapped_rows(motion, pairs, screening, "amplitudes", {"amplitudes_only": every})

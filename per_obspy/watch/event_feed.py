@@ -49,24 +49,15 @@ SETTLED = 10.0
 
 
 class Feed(NamedTuple):
-    """
-    Earthquakes that are new or may have changed.
+    """Earthquakes that are new or may have changed."""
 
-    Attributes
-    ----------
-    rows : dict
-        Identifier -> facts.
-    files : dict
-        Identifier -> name of its QuakeML file; empty if a service lists them.
-    problems : tuple of str
-        Lines and files that cannot be read.
-    seen : dict
-        Of a folder: name of a file -> size and time of change, as they were read.
-    """
-
+    #: Identifier -> facts.
     rows: dict[str, Earthquake]
+    #: Identifier -> name of its QuakeML file; empty if a service lists them.
     files: dict[str, str]
+    #: Lines and files that cannot be read.
     problems: tuple[str, ...]
+    #: Of a folder: name of a file -> size and time of change, as they were read.
     seen: dict[str, tuple[int, int]]
 
 

@@ -198,21 +198,13 @@ def looked(watcher: Watcher, state: EventState) -> tuple[EventState, bool]:
 
 
 class Done(NamedTuple):
-    """
-    Outcome of a run of an earthquake.
+    """Outcome of a run of an earthquake."""
 
-    Attributes
-    ----------
-    state : EventState
-        Of the earthquake afterwards, not written yet.
-    line : str
-        Outcome in a few words, for the log.
-    result : Result or None
-        Result of the run, None if there was none.
-    """
-
+    #: Of the earthquake afterwards, not written yet.
     state: EventState
+    #: Outcome in a few words, for the log.
     line: str
+    #: Result of the run, None if there was none.
     result: Result | None = None
 
 

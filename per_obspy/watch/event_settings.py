@@ -11,6 +11,7 @@ from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress
 from per_obspy.records.fdsn.providers import ROUTERS, base_url
+from per_obspy.watch.notified_run import check_groups
 from per_obspy.watch.relevance import Places
 from per_obspy.watch.state import EventState, moment
 
@@ -30,30 +31,19 @@ OF_ONE_WINDOW = ("event_id", "shakemap_version", "start", "end", "latitude", "lo
 
 
 class Watcher(NamedTuple):
-    """
-    Settings and state that the runs of all earthquakes share.
+    """Settings and state that the runs of all earthquakes share."""
 
-    Attributes
-    ----------
-    settings : Run
-        With a section ``watch``.
-    folder : Path
-        Watched folder.
-    places : Places
-        Of the inventory.
-    now : callable
-        Returns the time, with its zone.
-    progress : callable
-        Called for every stage of a run.
-    executor : Executor or None
-        Where stations and chunks are done, if not in processes of this machine.
-    """
-
+    #: With a section ``watch``.
     settings: Run
+    #: Watched folder.
     folder: Path
+    #: Of the inventory.
     places: Places
+    #: Returns the time, with its zone.
     now: Callable[[], datetime]
+    #: Called for every stage of a run.
     progress: Progress
+    #: Where stations and chunks are done, if not in processes of this machine.
     executor: Executor | None
 
     @property
@@ -88,6 +78,7 @@ def read_settings(file: Path) -> Run:
         placed["settle"] = records.get("settle", SETTLE)
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
+    check_groups(settings)
     _require_services(file, settings.watch, settings.records.fdsn if settings.records else None)
     return settings
 

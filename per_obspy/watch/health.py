@@ -27,45 +27,29 @@ STATUS = "status.json"
 
 
 class WatchStatus(State):
-    """
-    State of a watcher after its latest poll.
+    """State of a watcher after its latest poll."""
 
-    Attributes
-    ----------
-    last_poll : str or None
-        Time of the latest poll that succeeded, ISO 8601, UTC; None: none did yet.
-    events_open : int
-        Number of earthquakes that are still updated.
-    last_error : str or None
-        Reason why the latest poll or update failed; None: it succeeded.
-    next_due : str or None
-        Time at which the watcher works next, ISO 8601, UTC; None: it has ended for good.
-    failures : int
-        Number of polls and updates in succession that failed.
-    last_notification_error : str or None
-        Reason why the latest message was not delivered; None: it was, or there was none.
-    ignored : tuple of str
-        Listed earthquakes without runs, each with the reason, the latest last.
-    running : bool
-        Whether the process stays between polls, rather than being started by a timer.
-    pid : int
-        Number of the process that wrote the status.
-    host : str
-        Name of its machine.
-    version : str
-        Of per_obspy.
-    """
-
+    #: Time of the latest poll that succeeded, ISO 8601, UTC; None: none did yet.
     last_poll: Moment | None = None
+    #: Number of earthquakes that are still updated.
     events_open: int = Field(0, ge=0)
+    #: Reason why the latest poll or update failed; None: it succeeded.
     last_error: str | None = None
+    #: Time at which the watcher works next, ISO 8601, UTC; None: it has ended for good.
     next_due: Moment | None = None
+    #: Number of polls and updates in succession that failed.
     failures: int = Field(0, ge=0)
+    #: Reason why the latest message was not delivered; None: it was, or there was none.
     last_notification_error: str | None = None
+    #: Listed earthquakes without runs, each with the reason, the latest last.
     ignored: tuple[str, ...] = ()
+    #: Whether the process stays between polls, rather than being started by a timer.
     running: bool = False
+    #: Number of the process that wrote the status.
     pid: int = Field(default_factory=os.getpid, ge=0)
+    #: Name of its machine.
     host: str = Field(default_factory=platform.node)
+    #: Of per_obspy.
     version: str = Field(default_factory=lambda: version("per_obspy"))
 
 
@@ -108,22 +92,14 @@ LATE = 900.0
 
 
 class Health(NamedTuple):
-    """
-    Health of a folder.
+    """Health of a folder."""
 
-    Attributes
-    ----------
-    state : str
-        ``"fine"``, ``"late"``, ``"failing"``, ``"damaged"``, ``"stopped"``, ``"unfinished"`` or
-        ``"nothing_usable"``.
-    lines : tuple of str
-        Facts in words.
-    facts : dict
-        The same as plain values.
-    """
-
+    #: ``"fine"``, ``"late"``, ``"failing"``, ``"damaged"``, ``"stopped"``, ``"unfinished"`` or
+    #: ``"nothing_usable"``.
     state: str
+    #: Facts in words.
     lines: tuple[str, ...]
+    #: The same as plain values.
     facts: dict[str, Any]
 
 

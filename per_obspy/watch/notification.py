@@ -33,27 +33,17 @@ UNDELIVERED = 4
 
 
 class Message(NamedTuple):
-    """
-    A message about one earthquake or run.
+    """A message about one earthquake or run."""
 
-    Attributes
-    ----------
-    kind : str
-        ``"first"``, ``"changed"`` or ``"failure"``.
-    title : str
-        One line.
-    text : str
-        Summary of the result, or the reason of the failure.
-    report : Path or None
-        Page with the result; None if there is none.
-    group : Group or None
-        Who gets it; None: everybody.
-    """
-
+    #: ``"first"``, ``"changed"`` or ``"failure"``.
     kind: Kind
+    #: One line.
     title: str
+    #: Summary of the result, or the reason of the failure.
     text: str
+    #: Page with the result; None if there is none.
     report: Path | None = None
+    #: Who gets it; None: everybody.
     group: Group | None = None
 
 

@@ -36,19 +36,12 @@ PLACES = "places.json"
 
 
 class Places(NamedTuple):
-    """
-    Places that represent an inventory.
+    """Places that represent an inventory."""
 
-    Attributes
-    ----------
-    longitude, latitude : (n_places,) ndarray
-        Degrees.
-    radius : float
-        Of the circle around each that its buildings are in, m.
-    """
-
+    #: Degrees.
     longitude: FloatArray
     latitude: FloatArray
+    #: Of the circle around each that its buildings are in, m.
     radius: float
 
 

@@ -46,85 +46,56 @@ StateType = TypeVar("StateType", bound=State)
 
 
 class EventState(State):
-    """
-    State of one earthquake.
+    """State of one earthquake."""
 
-    Attributes
-    ----------
-    event_id : str
-        As its service names it, or of its file.
-    state : str
-        ``"open"``: runs are due; ``"closed"``: deleted, or no longer strong or near enough;
-        ``"finished"``: too old for further runs.
-    reason : str
-        Why it is closed.
-    first_seen : str
-        Time at which it was opened first, ISO 8601, UTC.
-    time : str
-        Origin time, ISO 8601, UTC.
-    latitude, longitude : float
-        Of the epicentre, degrees.
-    depth : float or None
-        m.
-    magnitude : float or None
-    magnitude_type, place : str
-    magnitude_assumed : bool
-        Whether it matters only because of the magnitude that is assumed where none is known.
-    file : str
-        QuakeML file in the watched folder of QuakeML; empty if a service lists it.
-    listed : str
-        Hash of its facts in the latest list.
-    confirmed : str
-        Time at which its service or file had it last.
-    done : dict
-        Delay of each run that was done, s, as text -> its time.
-    changed : bool
-        Whether the earthquake has changed since its latest run.
-    complete : bool
-        Whether the services of records answered everything at its latest run.
-    arrivals : str
-        Hash of the names, sizes and times of the record files at its latest run.
-    fetched : str
-        Hash of the records of services at its latest run.
-    missing : bool
-        Whether a station that a service lists has no records, or incomplete ones.
-    looked : str or None
-        Time of the latest request for missing records between two runs.
-    revision : int
-        Number of its newest revision, 0 if there is none.
-    failures : int
-        Number of failures in succession.
-    not_before : str or None
-        Time before which no run is tried again.
-    last_error : str or None
-        Reason of the latest failure.
-    """
-
+    #: As its service names it, or of its file.
     event_id: str
+    #: ``"open"``: runs are due; ``"closed"``: deleted, or no longer strong or near enough;
+    #: ``"finished"``: too old for further runs.
     state: Literal["open", "closed", "finished"] = "open"
+    #: Why it is closed.
     reason: str = ""
+    #: Time at which it was opened first, ISO 8601, UTC.
     first_seen: Moment
+    #: Origin time, ISO 8601, UTC.
     time: Moment
+    #: Of the epicentre, degrees.
     latitude: float = Field(ge=-90, le=90)
     longitude: float = Field(ge=-180, le=180)
+    #: m.
     depth: float | None = None
     magnitude: float | None = None
     magnitude_type: str = ""
     place: str = ""
+    #: Whether it matters only because of the magnitude that is assumed where none is known.
     magnitude_assumed: bool = False
+    #: QuakeML file in the watched folder of QuakeML; empty if a service lists it.
     file: str = ""
+    #: Hash of its facts in the latest list.
     listed: str = ""
+    #: Time at which its service or file had it last.
     confirmed: Moment
+    #: Delay of each run that was done, s, as text -> its time.
     done: dict[str, Moment] = Field(default_factory=dict)
+    #: Whether the earthquake has changed since its latest run.
     changed: bool = True
+    #: Whether the services of records answered everything at its latest run.
     complete: bool = True
+    #: Hash of the names, sizes and times of the record files at its latest run.
     arrivals: str = ""
+    #: Hash of the records of services at its latest run.
     fetched: str = ""
+    #: Whether a station that a service lists has no records, or incomplete ones.
     missing: bool = False
+    #: Time of the latest request for missing records between two runs.
     looked: Moment | None = None
+    #: Number of its newest revision, 0 if there is none.
     revision: int = Field(0, ge=0)
+    #: Number of failures in succession.
     failures: int = Field(0, ge=0)
+    #: Time before which no run is tried again.
     not_before: Moment | None = None
+    #: Reason of the latest failure.
     last_error: str | None = None
 
     @property
@@ -135,43 +106,28 @@ class EventState(State):
 
 
 class WatchState(State):
-    """
-    State of a watched folder.
+    """State of a watched folder."""
 
-    Attributes
-    ----------
-    source : str
-        Service or folder to which all of this belongs.
-    last_poll : str or None
-        Time of the latest look at the list of earthquakes that succeeded, ISO 8601, UTC.
-    since : str or None
-        Time from which on changes are asked for; None: everything is asked for.
-    failures : int
-        Number of looks in succession that failed.
-    not_before : str or None
-        Time before which the list is not asked for again.
-    last_error : str or None
-        Why the latest look failed.
-    resting : dict
-        Host of a service -> time before which it is not asked for records, as it demanded.
-    seen : dict
-        File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
-    judged : str
-        Hash of the settings and places by which earthquakes were opened or ignored.
-    ignored : dict
-        Identifier of a listed earthquake without runs -> its QuakeML file (empty if a service lists
-        it) and its facts with the reason, the latest last.
-    """
-
+    #: Service or folder to which all of this belongs.
     source: str = ""
+    #: Time of the latest look at the list of earthquakes that succeeded, ISO 8601, UTC.
     last_poll: Moment | None = None
+    #: Time from which on changes are asked for; None: everything is asked for.
     since: Moment | None = None
+    #: Number of looks in succession that failed.
     failures: int = Field(0, ge=0)
+    #: Time before which the list is not asked for again.
     not_before: Moment | None = None
+    #: Why the latest look failed.
     last_error: str | None = None
+    #: Host of a service -> time before which it is not asked for records, as it demanded.
     resting: dict[str, Moment] = Field(default_factory=dict)
+    #: File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
     seen: dict[str, tuple[int, int]] = Field(default_factory=dict)
+    #: Hash of the settings and places by which earthquakes were opened or ignored.
     judged: str = ""
+    #: Identifier of a listed earthquake without runs -> its QuakeML file (empty if a service lists
+    #: it) and its facts with the reason, the latest last.
     ignored: dict[str, tuple[str, str]] = Field(default_factory=dict)
 
 
@@ -283,18 +239,11 @@ TOLERANCE = 60.0
 
 
 class Task(NamedTuple):
-    """
-    A run that is due.
+    """A run that is due."""
 
-    Attributes
-    ----------
-    delay : float
-        Latest delay that has passed, s after the origin time.
-    reasons : tuple of str
-        ``"delay"``, ``"update"``, ``"records"`` and ``"retry"``, as many as apply.
-    """
-
+    #: Latest delay that has passed, s after the origin time.
     delay: float
+    #: ``"delay"``, ``"update"``, ``"records"`` and ``"retry"``, as many as apply.
     reasons: tuple[str, ...]
 
 

@@ -7,8 +7,9 @@ they describe. A failure of one earthquake stops no other.
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
@@ -22,12 +23,7 @@ from per_obspy.runs.output_folder import RECORD, Result, locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
 from per_obspy.watch.event_settings import Watcher
 from per_obspy.watch.health import WatchStatus, write_status
-from per_obspy.watch.notified_run import (
-    check_groups,
-    notify_failure,
-    notify_result,
-    undelivered,
-)
+from per_obspy.watch.notified_run import notify_failure, notify_result, undelivered
 from per_obspy.watch.polling import confirm, is_over, keep, polled
 from per_obspy.watch.relevance import inventory_places
 from per_obspy.watch.revisions import WORK, point_latest, revision_folder
@@ -58,37 +54,22 @@ def utc_now() -> datetime:
 
 
 class Clock(NamedTuple):
-    """
-    Time and waiting, which tests replace.
+    """Time and waiting, which tests replace."""
 
-    Attributes
-    ----------
-    now : callable
-        Returns the time, with its zone.
-    wait : callable
-        Waits for some seconds, and returns whether the program shall end.
-    """
-
+    #: Returns the time, with its zone.
     now: Callable[[], datetime] = utc_now
+    #: Waits for some seconds, and returns whether the program shall end.
     wait: Callable[[float], bool] = termination.pause
 
 
 class Pass(NamedTuple):
-    """
-    Outcome of one pass.
+    """Outcome of one pass."""
 
-    Attributes
-    ----------
-    errors : tuple of PerError
-        Why the list could not be read, and the failure of each earthquake.
-    open_events : int
-        Number of earthquakes with runs to come.
-    next_due : datetime
-        Time of the next poll or run.
-    """
-
+    #: Why the list could not be read, and the failure of each earthquake.
     errors: tuple[PerError, ...]
+    #: Number of earthquakes with runs to come.
     open_events: int
+    #: Time of the next poll or run.
     next_due: datetime
 
 
@@ -121,11 +102,7 @@ def watch_once(
     WriteError
         If the state cannot be written.
     """
-    folder, used = settings.output.resolve(), clock or Clock()
-    check_groups(settings)
-    with locked_folder(folder):
-        places = inventory_places(settings, folder)
-        watcher = Watcher(settings, folder, places, used.now, progress, executor)
+    with _watcher_of(settings, clock or Clock(), progress, executor) as watcher:
         return _one_pass(watcher, running=False)
 
 
@@ -140,12 +117,8 @@ def watch_forever(
 
     A pass that fails is tried again after a pause, which grows up to an hour.
     """
-    used = clock or Clock()
-    check_groups(settings)
-    folder, failures, end = settings.output.resolve(), 0, False
-    with locked_folder(folder):
-        places = inventory_places(settings, folder)
-        watcher = Watcher(settings, folder, places, used.now, progress, executor)
+    used, failures, end = clock or Clock(), 0, False
+    with _watcher_of(settings, used, progress, executor) as watcher:
         while not end:
             try:
                 next_due = _one_pass(watcher, running=True).next_due
@@ -157,6 +130,17 @@ def watch_forever(
                 seconds = pause(failures)
             seconds = min(max(seconds, 1.0), watcher.watch.poll)
             end = termination.requested() or used.wait(seconds)
+
+
+@contextmanager
+def _watcher_of(
+    settings: Run, clock: Clock, progress: Progress, executor: Executor | None
+) -> Iterator[Watcher]:
+    """Yield a watcher that alone works in its folder."""
+    folder = settings.output.resolve()
+    with locked_folder(folder):
+        places = inventory_places(settings, folder)
+        yield Watcher(settings, folder, places, clock.now, progress, executor)
 
 
 def _one_pass(watcher: Watcher, running: bool) -> Pass:

@@ -122,7 +122,9 @@ def test_the_identifier_of_an_earthquake_is_enough_for_records(server, tmp_path,
     assert code == 0, err
     record = json.loads(out)
     assert record["counts"]["stations"] == 2
-    assert record["configuration"]["records"]["shakemap"] == "fetched/shakemap-1/grid.xml"
+    known = record["configuration"]["records"]
+    assert known["shakemap"] == "fetched/shakemap-1/grid.xml"
+    assert known["stationlist"] == "fetched/shakemap-1/stationlist.json"
     assert "records: USGS:xx1 (identifier of an earthquake)" in err
     assert (tmp_path / "out" / "fetched").is_dir()
     # its configuration runs without the network
@@ -139,7 +141,8 @@ def add_map(server: FdsnServer, version: str, factor: float = 1.0) -> None:
     east, north = zip(*places, strict=True)
     box = [(min(one) - 1.0, (min(one) + max(one)) / 2, max(one) + 1.0) for one in (east, north)]
     rows = [(*r[:5], *(factor * x for x in r[5:8]), r[8]) for r in make_rows(box[0], box[1][::-1])]
-    server.add_map(version, grid_xml=grid_xml(FIELDS, rows, (3, 3)).encode())
+    files = {"grid_xml": grid_xml(FIELDS, rows, (3, 3)).encode()}
+    server.add_map(version, **files, stationlist_json=b'{"features": []}')
 
 
 def test_a_map_serves_until_records_come_and_each_version_is_named(server, tmp_path, call):
@@ -168,7 +171,8 @@ def test_a_map_serves_until_records_come_and_each_version_is_named(server, tmp_p
     # A map that is there is asked for again on demand only, and the same version is not sent again
     add_map(server, "2", factor=2.0)
     fetch = ("fetch", "xx1", "--event-service", server.url, "--provider", server.url, "--again")
-    call(*fetch, "--shakemap", "-o", tmp_path / "out" / "fetched")
+    for _ in range(2):
+        call(*fetch, "--shakemap", "-o", tmp_path / "out" / "fetched")
     sent = server.asked("/archive/product/shakemap/xx1/1/grid.xml")
     # Demand of a linear pair is proportional to the acceleration; rounding of its logarithm
     np.testing.assert_allclose(demands(), 2.0 * first, rtol=1e-12)

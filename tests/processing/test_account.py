@@ -186,12 +186,16 @@ def test_a_clock_that_was_never_set_is_a_flag_and_a_warning(start):
     assert record_flags(padded) == ["undated"]
 
 
-def test_film_is_a_flag_and_a_warning():
-    film = _trace()
+def test_film_and_a_nominal_sensitivity_are_flags_and_warnings():
+    film = _trace(conversion="sensitivity")
     film.stats.digitised = True
     noted = with_flags(film)
-    assert record_flags(noted) == ["digitised"]
+    assert record_flags(noted) == ["digitised", "nominal_sensitivity"]
     assert "film" in noted.stats.per_obspy.warnings
+    assert "no stages of the response" in noted.stats.per_obspy.warnings
+    # a response with stages, and a factor of a reader, say nothing of the kind
+    for conversion in ("response", "calibration factor"):
+        assert record_flags(_trace(conversion=conversion)) == []
 
 
 def test_a_bad_trace_is_rejected_alone():

@@ -14,6 +14,7 @@ from obspy.core.inventory.response import (
 
 from per_obspy.errors import RecordRejected
 from per_obspy.processing import instrument_response
+from per_obspy.processing.account import record_flags
 from per_obspy.processing.instrument_response import (
     LONGEST_PAD,
     as_recorded,
@@ -105,6 +106,8 @@ def test_an_overall_sensitivity_divides():
     bare = with_sensitivity(GAIN, "M/S**2", [])
     out = in_acceleration(counts(GAIN * acceleration, response=bare), TOLERANCE)
     assert_allclose(out.data, acceleration, rtol=1e-14)  # one multiplication and one division
+    # networks of cheap sensors state that of the model
+    assert "nominal_sensitivity" in record_flags(out)
 
 
 def test_the_factor_of_a_reader_of_acceleration_is_used():

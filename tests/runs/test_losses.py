@@ -2,10 +2,14 @@
 
 import json
 
+import numpy as np
+import pyarrow as pa
 import pytest
 
-from per_obspy.config import Run
-from per_obspy.runs.losses import losses, number_of_rows
+from per_obspy.config import Run, Totals
+from per_obspy.errors import Rejection
+from per_obspy.inventory.files.raw_rows import RawRows
+from per_obspy.runs.losses import areas_left_out, losses, number_of_rows
 
 SETTINGS = {"name": "lost", "output": "out", "records": {"folder": "records"}}
 
@@ -49,3 +53,13 @@ def test_a_share_of_rejected_rows_above_the_limit_is_a_loss(rejected, is_loss):
 
 def test_no_rows_are_no_loss():
     assert losses(_settings(0.0), {"pairs": 0, "rejected_pair": 0}, None) == []
+
+
+def test_a_table_without_names_of_pairs_counts_rows_with_a_line():
+    # would catch a screening by a spectrum that ends without a result where a pair is left out
+    table = pa.table(
+        {"longitude_1": ["20"], "latitude_1": ["10"], "longitude_2": ["20"], "latitude_2": ["10"]}
+    )
+    rows = RawRows("pairs.csv", table, np.array([2]), ())
+    rejected = [Rejection("pair", "line 2", "", None, ("too far",))]
+    assert areas_left_out(Totals(), rejected, rows) == {}

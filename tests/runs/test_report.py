@@ -112,8 +112,9 @@ KINDS += [('[totals]\narea = "position"\n', "Point")]
 
 @pytest.mark.parametrize(("kind", "shape"), KINDS)
 def test_totals_are_a_layer_too(copied, kind, shape):
-    write_configuration(copied, f"geopackage = true\n{PAIRS}{kind}")
+    write_configuration(copied, f"geopackage = true\npmtiles = true\n{PAIRS}{kind}")
     result = report(copied / "run.toml")
+    assert result.record["faults"] == []
     assert {"risk.gpkg", "risk.qgz", "risk.geoparquet", "totals.csv"} <= set(
         result.record["outputs"]
     )
@@ -130,6 +131,11 @@ def test_totals_are_a_layer_too(copied, kind, shape):
     information = pyogrio.read_info(copied / "out" / "risk.gpkg", layer="pairs")
     assert information["features"] == len(table)
     assert list(information["fields"]) == list(table)
+    # tiles of the farthest zoom have every pair as a point, where lines of some metres would vanish
+    tiles = copied / "out" / "risk_pairs.pmtiles"
+    assert tiles.name in result.record["outputs"]
+    _, _, _, names = pyogrio.raw.read(tiles, columns=["pair_id"], ZOOM_LEVEL="8")
+    assert set(names[0]) == set(table["pair_id"])
 
 
 #: Names of carried columns that a layer, a database or a figure keeps for itself.

@@ -144,7 +144,7 @@ HOSTILE = {
     "no place": ({**feature(), "geometry": None}, "coordinates = []"),
     "placeholder": (feature(place=(0, 0)), "0, 0 are a placeholder"),
     "code": (feature("../x"), "station code '../x'"),
-    "no properties": ({"type": "Feature"}, "it has no properties"),
+    "no properties": ({"type": "Feature"}, "it has no network and code"),
 }
 
 

@@ -24,6 +24,17 @@ service = "USGS"
 """
 
 
+GROUP = """\
+[notify]
+command = ["mail"]
+[[notify.groups]]
+name = "a"
+address = "b"
+least_class = "high"
+area = "none"
+"""
+
+
 def written(folder, text):
     (folder / "city.toml").write_text(text)
     return folder / "city.toml"
@@ -94,6 +105,7 @@ def test_a_folder_of_records_waits_for_half_written_files(tmp_path):
         ('service = "USGS"', 'service = "USGS"\nregion = {latitude = 95, longitude = 0}', "95"),
         ("before = 20", 'event_id = "x"', "records.fdsn.event_id is of one earthquake"),
         ("before = 20", 'start = "2020-01-01"', "records.fdsn.start is of one earthquake"),
+        ("[watch]", f"{GROUP}[watch]", r"notify\.groups\.0\.area: .*none: cannot be read"),
         ("before = 20", "shakemap_version = 2", "shakemap_version is of one earthquake"),
         ('[records.fdsn]\nproviders = ["GEONET"]\n', "[fdsn]\n", r"no section \[records\]"),
     ],

@@ -7,6 +7,7 @@ is the status file of the version that was fetched last.
 """
 
 import json
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ from per_obspy.records.earthquakes.services import event_url
 from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, WebPool, answer, host
 from per_obspy.records.shakemap import read_shakemap
+from per_obspy.records.station_list import read_station_list
 from per_obspy.resume import (
     Status,
     StatusError,
@@ -26,6 +28,8 @@ from per_obspy.resume import (
     read_status,
     write_status,
 )
+
+log = logging.getLogger(__name__)
 
 #: File of the product -> name here. Without the first there is no map.
 GRID, UNCERTAINTY, STATIONS = "grid.xml", "uncertainty.xml", "stationlist.json"
@@ -133,6 +137,13 @@ def _download(
         raise ServiceError(
             f"{public_url(url)}: its ShakeMap is damaged: {error.problem}"
         ) from error
+    # The map serves without its stations
+    if STATIONS in files:
+        try:
+            read_station_list(files[STATIONS])
+        except CatalogError as error:
+            files.pop(STATIONS).unlink()
+            log.warning("%s: left out: %s", public_url(url), error)
     return files
 
 

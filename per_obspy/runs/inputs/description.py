@@ -27,6 +27,9 @@ Lines = list[tuple[str, str]]
 #: Rows of a table that are read; earthquakes, rejections and keys of a configuration on the screen.
 MOST_ROWS, MOST_EARTHQUAKES, MOST_REJECTIONS, MOST_KEYS = 100_000, 4, 2, 12
 
+#: Signs on a map of a motion.
+SHARES = ("map", "# from half of it, + from a quarter, - below")
+
 #: Columns of a risk table that are read.
 _RISK_COLUMNS = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
 
@@ -186,9 +189,9 @@ def _of_shakemap(path: Path) -> Description:
         ("earthquake", f"{event}{', a scenario: SIMULATED' if is_scenario(path) else ''}"),
         ("periods", some([f"{period:g} s" for period in periods])),
         ("largest", f"{largest:.3g} m/s2 of {quantity}"),
-        ("map", "# from half of it, + from a quarter, - below"),
+        SHARES,
     ]
-    east, north = np.meshgrid(*(grid[name].to_numpy() for name in ("longitude", "latitude")))
+    east, north = np.meshgrid(grid["longitude"], grid["latitude"])
     known = {"event": event, "periods": periods, "largest": largest}
     title = "{1} by {0} points".format(*values.shape)
     return Description(Kind.SHAKEMAP, title, lines, _shares(east, north, values / largest), known)
@@ -198,27 +201,26 @@ def _of_station_list(path: Path) -> Description:
     """Describe a list of amplitudes; places are marked by their share of the largest motion."""
     from per_obspy.records.station_list import read_station_list
 
-    found = read_station_list(path)
-    stations, count = found.stations, len(found.stations)
-    rejected = [(row.name, row.reasons) for row in found.rejected]
+    stations, unusable, intensities = read_station_list(path)
+    # What is used, and what is left out
     lines = [
-        ("stations", f"{count} usable, {len(rejected)} not"),
-        *_rejected_lines(rejected),
-        ("intensities", f"{found.intensities} of people, left out"),
+        ("stations", f"{len(stations)} usable, {len(unusable)} not"),
+        *_rejected_lines([(row.name, row.reasons) for row in unusable]),
+        ("intensities", f"{intensities} of people, left out"),
     ]
-    known = {"stations": count, "rejected": len(rejected), "intensities": found.intensities}
+    known = {"stations": len(stations), "rejected": len(unusable)}
     if not stations:
         return Description(Kind.STATION_LIST, "no usable station", lines, {}, known, usable=False)
-    periods = sorted({period for station in stations for period in station.periods})
+    # Motion by its largest SD
+    periods = [period for station in stations for period in station.periods]
     largest = np.array([max(station.displacements) for station in stations])
     lines += [
-        ("periods", some([f"{period:g} s" for period in periods])),
-        ("largest", f"{largest.max():.3g} m of SD"),
-        ("map", "# from half of it, + from a quarter, - below"),
+        ("periods", span(periods, "s")),
+        SHARES,
     ]
     east, north = np.array([(one.longitude, one.latitude) for one in stations]).T
     places = _shares(east, north, largest / largest.max())
-    return Description(Kind.STATION_LIST, f"{count} stations", lines, places, known)
+    return Description(Kind.STATION_LIST, f"{len(stations)} stations", lines, places, known)
 
 
 def _shares(

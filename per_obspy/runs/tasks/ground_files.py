@@ -70,6 +70,25 @@ def ground_files(
     event: Hypocentre | None = None,
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """Describe the ground motion by finished stations and a ShakeMap; no station file is opened."""
+    files, spectra, rejected = _placed(stations)
+    # Motion between the stations, which recorded the same earthquake
+    hypocentre = hypocentre_of([dataset.attrs for dataset in spectra])
+    field = prepared_field(spectra, settings, hypocentre) if spectra else None
+    # Everything that decides the motion at a pair
+    contents = [(file.name, file.hash, file.flags) for file in files]
+    known = [*contents, *map(file_hash, shakemap), hypocentre]
+    key = bytes_hash(repr(known).encode())
+    ground = GroundFiles(tuple(files), field, shakemap, key)
+    if amplitudes is None:
+        return ground, rejected
+    added, unused = _with_amplitudes(ground, amplitudes, spectra, settings, hypocentre or event)
+    return added, (*rejected, *unused)
+
+
+def _placed(
+    stations: Iterable[FinishedStation],
+) -> tuple[list[StationFile], list[xr.Dataset], tuple[Rejection, ...]]:
+    """Return the stations with coordinates and their spectra, and rejections of the others."""
     files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
     # Pairs are given stations by distance
     for station in stations:
@@ -80,22 +99,21 @@ def ground_files(
         else:
             reason = "its coordinates are unknown: it serves no pair"
             rejected.append(Rejection("station", file.name, "", None, (reason,)))
+    return files, spectra, tuple(rejected)
 
-    # Motion between the stations, which recorded the same earthquake
-    hypocentre = hypocentre_of([dataset.attrs for dataset in spectra])
-    field = prepared_field(spectra, settings, hypocentre) if spectra else None
-    # Everything that decides the motion at a pair
-    contents = [(file.name, file.hash, file.flags) for file in files]
-    known = [*contents, *map(file_hash, shakemap), hypocentre]
-    listed = None
-    if amplitudes is not None:
-        source = hypocentre or event
-        content = read_station_list(amplitudes)
-        listed, unused = amplitude_field(content, str(amplitudes), spectra, settings, source)
-        rejected += unused
-        known += [file_hash(amplitudes), source]
-    key = bytes_hash(repr(known).encode())
-    return GroundFiles(tuple(files), field, shakemap, key, listed), tuple(rejected)
+
+def _with_amplitudes(
+    ground: GroundFiles,
+    amplitudes: Path,
+    records: list[xr.Dataset],
+    settings: Interpolation,
+    source: Hypocentre | None,
+) -> tuple[GroundFiles, tuple[Rejection, ...]]:
+    """Return a ground motion with the stations of a list, and those that are not used."""
+    listed = read_station_list(amplitudes)
+    field, unused = amplitude_field(listed, str(amplitudes), records, settings, source)
+    key = bytes_hash(repr([ground.key, file_hash(amplitudes), source]).encode())
+    return ground._replace(amplitudes=field, key=key), unused
 
 
 def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:

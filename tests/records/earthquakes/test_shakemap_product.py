@@ -33,6 +33,9 @@ def test_the_latest_version_comes_with_its_stations(service, tmp_path):
     files = fetch_shakemap(POOL, service.url, "xx1", tmp_path)
     assert (files.version, files.uncertainty) == ("2", None)
     assert files.stations.read_bytes() == b'{"features": []}'
+    # A list that is none costs the map nothing
+    service.add_map("3", grid_xml=GRID, stationlist_json=b"<html>")
+    assert fetch_shakemap(POOL, service.url, "xx1", tmp_path / "other").stations is None
     first = fetch_shakemap(POOL, service.url, "xx1", tmp_path, "1")
     assert first.version == "1"
     # twice the acceleration, exactly: doubling loses no digit
