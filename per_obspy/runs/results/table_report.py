@@ -13,7 +13,7 @@ from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.errors import CatalogError
 from per_obspy.report.page.document import write_page
 from per_obspy.report.results import Drawings, Region, Results, Revision
-from per_obspy.report.texts import LANGUAGES
+from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.runs.results.report_files import (
@@ -153,7 +153,9 @@ def _scenario_sentences(settings: Ensemble) -> list[str]:
     return [
         texts["scenarios"].format(count=len(settings.weights)),
         *(
-            sentence.format(name=name_text(name), value=f"{value:g}")
+            sentence.format(
+                name=name_text(name), value=f"{value:g}".translate(marks(settings.report.language))
+            )
             for name, value in [*settings.weights.items()][:5]
         ),
     ]
