@@ -148,10 +148,11 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.runs.inputs.extras import require_extras
     from per_obspy.screening.design import design_table, read_design_spectrum
 
-    # Screen
+    # Whatever would stop the report later
     settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     require_background(settings.report.background)
+    # Screen
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)

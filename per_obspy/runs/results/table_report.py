@@ -148,16 +148,15 @@ def _write(
 
 def _scenario_sentences(settings: Ensemble) -> list[str]:
     """Return sentences on the number of scenarios, and the names of the first ones."""
-    texts = LANGUAGES[settings.report.language]
+    language = settings.report.language
+    texts, first = LANGUAGES[language], [*settings.weights.items()][:5]
     sentence = texts["scenario_rate" if settings.yearly else "scenario_weight"]
+    # Weights with all their digits
+    values = (f"{value:g}".translate(marks(language)) for _, value in first)
+    named = zip(first, values, strict=True)
     return [
         texts["scenarios"].format(count=len(settings.weights)),
-        *(
-            sentence.format(
-                name=name_text(name), value=f"{value:g}".translate(marks(settings.report.language))
-            )
-            for name, value in [*settings.weights.items()][:5]
-        ),
+        *(sentence.format(name=name_text(name), value=value) for (name, _), value in named),
     ]
 
 
