@@ -2,12 +2,15 @@
 The figures of the README, from the demonstration: a pair from its record on, and the region.
 
 ``make figures`` writes them to ``output/readme_figures``; with ``-o docs/figures`` they are those
-of the README. The demonstration is run first where it is not done.
+of the README and of the first page of the docs. The demonstration is run first where it is not
+done.
 """
 
 import argparse
 import shutil
 from pathlib import Path
+
+from real_earthquake import photograph
 
 from per_obspy.runs.run import run
 
@@ -26,6 +29,7 @@ def main() -> None:
     result = run(CHECKOUT / "workflows" / "demo.toml")
     for name, figure in FIGURES.items():
         shutil.copyfile(result.folder / "figures" / figure, folder / name)
+    photograph(result.folder / "report.html", folder / "page_1280.png", 1280, 1240)
     print(f"figures are in {folder}")
 
 

@@ -166,7 +166,7 @@ def session(desk: Path) -> str:
     parts += [typed(f"{mend}\n{run} --quiet\ncat out/summary.txt", desk)]
     shutil.copy(desk / "out" / "figures" / "worst_pair.png", FIGURES / "earthquake_pair.png")
     shrink(FIGURES / "earthquake_pair.png")
-    for name, width, height in (("page", 1280, 900), ("telephone", 400, 900)):
+    for name, width, height in (("page", 1280, 1300), ("telephone", 400, 900)):
         photograph(desk / "out" / "report.html", FIGURES / f"earthquake_{name}.png", width, height)
     parts += [PICTURES, typed("per-obspy show '#1' out", desk), conclusions(desk / "out"), LAST]
     return "".join(parts)
@@ -257,7 +257,7 @@ def typed(commands: str, desk: Path) -> str:
         answer = ask(command, desk)
         seconds = time.monotonic() - began
         lines.append(f"$ {command}" + (f"  # {seconds:.0f} s" if seconds > 10.0 else ""))
-        lines += answer.splitlines()[:LINES]
+        lines += [line.rstrip() for line in answer.splitlines()[:LINES]]
         lines += ["…"] * (len(answer.splitlines()) > LINES)
     text = "\n".join(line if len(line) <= LETTERS else line[: LETTERS - 1] + "…" for line in lines)
     return f"```console\n{text}\n```\n\n"

@@ -91,7 +91,11 @@ POSITIONS = ("inside", "end", "corner", "single")
 
 #: One row per building, worst first.
 BUILDINGS: tuple[Column, ...] = (
-    _count("rank", "order of inspection, by severity, amplification, probability, importance"),
+    _count(
+        "rank",
+        "order of inspection, by severity (of an unknown gap what its demand stands for), "
+        "amplification, probability, importance",
+    ),
     _text("building_id", "identifier in the pair table; PAIR#1 or PAIR#2 without one"),
     _number(
         "severity",

@@ -21,10 +21,13 @@ from per_obspy.screening.values import values
 #: Columns of the risk table that a side of a building needs, besides those of its interface.
 OF_PAIRS = (
     "rank", "state", "probability", "weighted_velocity", "missing_gap",
-    "supplemental_damping", "bumper_restitution", "floors_misaligned",
-    *(f"{name}_{i}" for name in ("longitude", "latitude", "importance", "occupants")
+    "supplemental_damping", "bumper_restitution", "floors_misaligned", "demand",
+    *(f"{name}_{i}" for name in ("longitude", "latitude", "importance", "occupants", "period")
       for i in (1, 2)),
 )  # fmt: skip
+
+#: Impact velocity for which the worst unknown gap of a building stands in the ranking, m/s.
+UNKNOWN = "velocity_of_unknown"
 
 #: Texts of a building without need of a measure, and of one that needs them in other gaps.
 NOTHING = "no measure for the likeliest inputs: its gaps are enough"
@@ -102,7 +105,8 @@ def building_table(table: pd.DataFrame, classes: Mapping[str, float], angle: flo
     table : DataFrame
         Interfaces as seen from one of their buildings, all of a building one after the other:
         columns of its row and pair without ``_left``, ``_right``, ``_1`` and ``_2``, with
-        ``neighbour_number``, ``neighbour_id``, ``direction`` (towards it, degrees) and ``area``.
+        ``neighbour_number``, ``neighbour_id``, ``direction`` (towards it, degrees), ``area`` and
+        ``UNKNOWN``.
     classes : mapping of str to float
         Name and smallest severity of each risk class, m/s, descending to 0.
     angle : float
@@ -111,7 +115,7 @@ def building_table(table: pd.DataFrame, classes: Mapping[str, float], angle: flo
     Returns
     -------
     DataFrame
-        The columns ``columns.BUILDINGS`` without ``rank``, and ``building_number``.
+        The columns ``columns.BUILDINGS`` without ``rank``, ``building_number``, and ``UNKNOWN``.
     """
     sides = Sides(table)
     severity = _severity(sides)
@@ -135,6 +139,7 @@ def building_table(table: pd.DataFrame, classes: Mapping[str, float], angle: flo
         "longest_row": sides.largest(sides["buildings"]).astype(np.int64),
         **{name: sides.largest(sides[name]) for name in ("importance", "occupants")},
         "flags": _flags(sides),
+        UNKNOWN: sides.largest(sides[UNKNOWN]),
     }
     return pd.DataFrame(columns)
 

@@ -27,7 +27,7 @@ from per_obspy.buildings.search import (
     tables_of,
     whole_groups,
 )
-from per_obspy.buildings.sides import OF_PAIRS, building_table, directions
+from per_obspy.buildings.sides import OF_PAIRS, UNKNOWN, building_table, directions
 from per_obspy.config import Run, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
@@ -35,6 +35,7 @@ from per_obspy.results.parts import text_columns
 from per_obspy.results.risk import write_worst
 from per_obspy.results.table_files import regrouped, schema_of, table_of, write_meanings
 from per_obspy.results.totals import PLACE, areas_of
+from per_obspy.screening.ranking import velocity_of_unknown
 
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000
@@ -50,12 +51,20 @@ _OF_ROWS = (
       for name in ("building_id", "building_number", "amplification", "amplification_alone")),
 )  # fmt: skip
 
-#: Columns of a building before it has a rank.
-UNRANKED = (Column("building_number", "int64", "1", ""), *BUILDINGS[1:])
+#: Columns by which an unknown gap is ranked.
+_UNKNOWN_BY = ("probability", "demand", "period_1", "period_2")
 
-#: Order of the ranking; the last ones only break ties.
+#: Columns of a building before it has a rank.
+UNRANKED = (
+    Column("building_number", "int64", "1", ""),
+    *BUILDINGS[1:],
+    Column(UNKNOWN, "float64", "m/s", ""),
+)
+
+#: Order of the ranking; unknown gaps stand beside the others, as among pairs. The last ones only
+#: break ties.
 _ORDER = (
-    "severity DESC NULLS LAST, "
+    f"greatest(severity, {UNKNOWN}) DESC NULLS LAST, "
     "greatest(amplification_row, amplification_pair) DESC NULLS LAST, "
     "probability_independent DESC NULLS LAST, importance DESC NULLS LAST, "
     "occupants DESC NULLS LAST, building_id, building_number"
@@ -184,6 +193,8 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
             # Columns that the pair table does not have are empty
             empty = pa.nulls(pairs.num_rows, pa.float64())
             columns |= {name: pairs[name] if name in carried else empty for name in OF_PAIRS}
+            known = [name for name in _UNKNOWN_BY if name in carried]
+            columns[UNKNOWN] = velocity_of_unknown(pairs.select(known).to_pandas())
             yield pa.table(columns)
 
 

@@ -333,7 +333,6 @@ def _print_doubtful(table: "pd.DataFrame") -> None:
 
 def _print_profile(table: "pd.DataFrame") -> None:
     """Print the columns of a pair table: given, derived and unknown ones."""
-    from per_obspy.inventory.places import place_columns
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
     profile, derived, unused = (
@@ -355,7 +354,14 @@ def _print_profile(table: "pd.DataFrame") -> None:
     if derived:
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
-    # Columns of places are carried too, but they name pairs and buildings
+    _print_unused(unused)
+
+
+def _print_unused(unused: list[str]) -> None:
+    """Print the columns that are only carried, those of places apart."""
+    from per_obspy.inventory.places import place_columns
+
+    # They name pairs and buildings
     places = [name for name in unused if name == "place" or name in place_columns(unused)]
     unknown = [name for name in unused if name not in places]
     for title, names in (("Names of places", places), ("Unknown columns", unknown)):

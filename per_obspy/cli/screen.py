@@ -152,11 +152,11 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.screening.design import design_table, read_design_spectrum
     from per_obspy.screening.hazard import hazard_table, is_hazard, read_hazard
 
-    # Screen
+    # Whatever would stop the report later
     settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     require_background(settings.report.background)
-    # By the hazard of many motions, or by one spectrum
+    # Screen: by the hazard of many motions, or by one spectrum
     pairs, given = read_pairs(settings.pairs), (settings.building, settings.screening)
     if is_hazard(settings.spectrum):
         hazard = read_hazard(settings.spectrum)

@@ -211,6 +211,7 @@ def largest_towns(
     """
     (west, south), (east, north) = low, high
     names, at_east, at_north, people, _ = _towns()
+    # Longitudes from the western edge on
     beyond = west + (at_east - west) % 360.0
     inside = np.flatnonzero((beyond <= east) & (at_north >= south) & (at_north <= north))
     chosen = inside[np.argsort(-people[inside], kind="stable")][:most].tolist()

@@ -183,6 +183,7 @@ def draw_map(
     seen = region._replace(stations=region.stations[:0], epicentre=None) if around_pairs else region
     frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
+    # Texts beside them, as far as there is room
     labels = _Labels(axes, frame)
     _draw_stations(axes, region, frame)
     _write_amplitudes(labels, region, language)
@@ -326,6 +327,7 @@ class _Labels:
 
     def write(self, text: str, east: float, north: float, **style: Any) -> bool:
         """Write a text to the right of a place if it has room there."""
+        # The box of the text, in degrees
         width, height = self.letter
         left, right = east + 0.5 * width, east + (1.5 + len(text)) * width
         box = (left, north - 0.5 * height, right, north + 0.5 * height)
@@ -350,6 +352,7 @@ def _write_amplitudes(labels: _Labels, region: Region, language: str) -> None:
     places = region.stations[["longitude", "latitude"]].to_numpy(dtype=np.float64)
     peaks = _amplitudes(region)
     east, north, inside = _inside(places, labels.frame)
+    # Texts of many would hide the pairs
     chosen = np.flatnonzero(inside & np.isfinite(peaks))
     if len(chosen) <= MOST_LABELS:
         for i in chosen.tolist():
@@ -358,6 +361,7 @@ def _write_amplitudes(labels: _Labels, region: Region, language: str) -> None:
 
 def _write_towns(labels: _Labels, points: _Points) -> None:
     """Write the names of the largest towns, and a dot for each."""
+    # The largest take their room first
     frame, count = labels.frame, 0
     for name, longitude, latitude in towns_around(points.longitude, points.latitude, MOST_TOWNS):
         east, north, inside = _inside(np.array([[longitude, latitude]]), frame)
@@ -444,8 +448,7 @@ def _add_legend(
     # Classes that a pair has
     for name, colour in class_colours(region.classes).items():
         if count := int(counts.get(name, 0)):
-            words = literal(texts.get(f"class_{name}", name))
-            text = counted(language, "overview_class", count, name=words)
+            text = _class_label(name, count, language)
             style: dict[str, Any] = {"marker": "o", "linestyle": "", "color": colour}
             style |= {"markeredgecolor": "black", "markeredgewidth": 0.3}
             handles += axes.plot([], [], label=text, **style)
@@ -458,6 +461,12 @@ def _add_legend(
     figure.legend(handles=handles, loc="outside lower left", ncols=4, fontsize=9, frameon=False)
 
 
+def _class_label(name: str, count: int, language: str) -> str:
+    """Return a class in words, and its number of pairs."""
+    words = literal(LANGUAGES[language].get(f"class_{name}", name))
+    return counted(language, "overview_class", count, name=words)
+
+
 def _draw_gaps(
     axes: Axes, table: pd.DataFrame, classes: Sequence[str], texts: Mapping[str, str]
 ) -> None:
@@ -467,8 +476,8 @@ def _draw_gaps(
         chosen = table[table["risk_class"] == name]
         axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=colours[name])
     # The demand of the medians; the class is that of the whole population
-    demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
-    demand, gap = (value if np.isfinite(value) else 0.0 for value in (demand, gap))
+    largest = 100 * table[["demand", "gap"]].max().to_numpy(np.float64)
+    demand, gap = np.where(np.isfinite(largest), largest, 0.0).tolist()
     # Scales of both axes differ: equal values lie on a curve
     equal = np.linspace(0.0, demand, 500)
     axes.plot(equal, equal, color=MOTION_COLOUR, linewidth=0.8)

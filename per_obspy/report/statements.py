@@ -205,12 +205,14 @@ def _inspections(hit: pd.DataFrame, results: Results) -> list[str]:
     if len(areas) > 1 and "expected_pounding" in areas:
         most = areas.sort_values("expected_pounding", ascending=False)[:3]
         places = [_placed_name(area, results.language) for _, area in most.iterrows()]
-        steps.append(texts["todo_areas"].format(names=", ".join(places)))
+        steps.append(texts["todo_areas"].format(names="; ".join(places)))
     return steps
 
 
 def _placed_name(area: "pd.Series[Any]", language: str) -> str:
-    """Return the name of an area with the coordinates of its centre."""
+    """Return the name of an area with the coordinates of its centre, unless they are the name."""
+    if re.fullmatch(r"[\d.]+ [NS], [\d.]+ [EW]", str(area["area"])):
+        return str(area["area"])
     place = (written(area[name], 3, language) for name in ("latitude", "longitude"))
     return f"{_names([area['area']])} ({' / '.join(place)})"
 
@@ -263,7 +265,7 @@ def event_sentences(facts: Mapping[str, Any], language: str = "en") -> list[str]
             break
     # Size, place and map
     if math.isfinite(size := number(facts, "magnitude")):
-        sentences.append(texts["magnitude"].format(value=f"{size:.1f}"))
+        sentences.append(texts["magnitude"].format(value=written(size, 1, language)))
     sentences += _epicentre(facts, language)
     if facts.get("map"):
         issue = name_text(facts.get("version") or "?")
@@ -279,7 +281,7 @@ def _epicentre(facts: Mapping[str, Any], language: str) -> list[str]:
     # The depth may be unknown
     place, depth = place_text(north, east, 3, language), number(facts, "depth") / 1000.0
     key = "epicentre_depth" if math.isfinite(depth) else "epicentre_at"
-    return [LANGUAGES[language][key].format(place=place, depth=f"{depth:.0f}")]
+    return [LANGUAGES[language][key].format(place=place, depth=written(depth, 0, language))]
 
 
 def revision_line(revision: Revision, language: str) -> str:
@@ -462,6 +464,5 @@ def place_text(north: float, east: float, decimals: int, language: str = "en") -
     # Longitudes may go beyond 180 degrees
     east = (east + 180.0) % 360.0 - 180.0
     sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
-    return (
-        f"{abs(north):.{decimals}f} {texts[sides[0]]}, {abs(east):.{decimals}f} {texts[sides[1]]}"
-    )
+    at = (written(abs(degrees), decimals, language) for degrees in (north, east))
+    return ", ".join(f"{number} {texts[side]}" for number, side in zip(at, sides, strict=True))

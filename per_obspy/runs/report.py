@@ -33,7 +33,7 @@ from per_obspy.report.pair_figure import differing_pair
 from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.statements import event_sentences
 from per_obspy.report.tally import PAGE_PAIRS
-from per_obspy.report.texts import LANGUAGES
+from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
@@ -335,14 +335,15 @@ def report_ensemble(
 
 def _scenario_sentences(settings: Ensemble) -> list[str]:
     """Return sentences on the number of scenarios, and the names of the first ones."""
-    texts = LANGUAGES[settings.report.language]
+    language = settings.report.language
+    texts, first = LANGUAGES[language], [*settings.weights.items()][:5]
     sentence = texts["scenario_rate" if settings.yearly else "scenario_weight"]
+    # Weights with all their digits
+    values = (f"{value:g}".translate(marks(language)) for _, value in first)
+    named = zip(first, values, strict=True)
     return [
         texts["scenarios"].format(count=len(settings.weights)),
-        *(
-            sentence.format(name=name_text(name), value=f"{value:g}")
-            for name, value in [*settings.weights.items()][:5]
-        ),
+        *(sentence.format(name=name_text(name), value=value) for (name, _), value in named),
     ]
 
 

@@ -319,6 +319,9 @@ CSV_COLUMNS = (
     "storeys_1", "storeys_2", "system_1", "system_2",
 )  # fmt: skip
 
+#: Columns of a CSV file at most: a person reads it.
+MOST_COLUMNS = 30
+
 #: Columns that depend on the contact law, whose own deviation is 5 to 20 %: texts have two digits.
 BY_CONTACT = frozenset(
     {
@@ -331,9 +334,15 @@ BY_CONTACT = frozenset(
 
 
 def csv_columns(names: Iterable[str]) -> list[str]:
-    """Return the columns of a table that its CSV file has, in their order."""
-    known = list(names)
-    return [name for name in (*CSV_COLUMNS, *HAZARD, *rule_columns()) if name in known]
+    """
+    Return the columns of a table that its CSV file has, in their order, at most ``MOST_COLUMNS``.
+
+    Rules of codes that have no room are in the Parquet file, as is everything else.
+    """
+    known = set(names)
+    always = [name for name in (*CSV_COLUMNS, *HAZARD) if name in known]
+    *rules, suffices = [name for name in rule_columns() if name in known] or [""]
+    return [*always, *rules[: MOST_COLUMNS - len(always) - 1], *filter(None, [suffices])]
 
 
 @cache

@@ -186,7 +186,7 @@ def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
     """Return the columns ``KEYS``; the worst pair has the smallest numbers."""
     # Negated, for more is worse
     keys = (
-        -np.maximum(_largest(table, "weighted_velocity"), _velocity_of_unknown(table)),
+        -np.maximum(_largest(table, "weighted_velocity"), velocity_of_unknown(table)),
         -_largest(table, "expected_amplification"),
         -_largest(table, "probability"),
         -_largest(table, "importance_1", "importance_2"),
@@ -209,7 +209,7 @@ def _ties_by_name(order: IndexArray, badness: FloatArray, names: TextArray) -> I
     return result
 
 
-def _velocity_of_unknown(table: pd.DataFrame) -> FloatArray:
+def velocity_of_unknown(table: pd.DataFrame) -> FloatArray:
     """Return the impact velocity that the demand stands for where the gap is unknown, else 0."""
     known = table.reindex(columns=["probability", "demand", "period_1", "period_2"])
     probability, demand, *periods = known.to_numpy(np.float64).T

@@ -11,6 +11,7 @@ from per_obspy.buildings.sides import (
     MEASURE,
     NOTHING,
     OF_PAIRS,
+    UNKNOWN,
     building_table,
     directions,
 )
@@ -56,6 +57,7 @@ def interfaces(**columns):
             "supplemental_damping": [np.nan, 0.0, 0.1],
             "bumper_restitution": [0.4, 1.0, 0.3],
             "floors_misaligned": [False, False, True],
+            UNKNOWN: 0.0,
         }
     ).assign(**columns)
     for side in ("left", "right"):
@@ -79,7 +81,7 @@ def buildings(angle=30.0, **columns):
 
 
 def test_the_sides_use_columns_that_the_tables_have():
-    known = {column.name for column in ROWS} | set(OF_PAIRS) | {"area"}
+    known = {column.name for column in ROWS} | set(OF_PAIRS) | {"area", UNKNOWN}
     assert set(interfaces()) <= known
 
 
@@ -87,6 +89,7 @@ def test_every_column_is_there():
     assert set(buildings().reset_index()) == {
         *(column.name for column in BUILDINGS if column.name != "rank"),
         "building_number",
+        UNKNOWN,
     }
 
 

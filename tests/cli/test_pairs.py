@@ -147,6 +147,11 @@ def test_check_prints_what_a_table_gives_and_what_is_wrong(call, table):
     assert "period_1 (1)" in out.partition("Derived or assumed instead (rows): ")[2]
     assert "line 3, b: gap = 50" in out
     assert "height_1" in out
+    # Columns of places are not called unknown
+    table.write_text(f"{HEADER},sokak_1,place,owner\n{ROW},14,old town,me\n")
+    _, out, _ = call("pairs", "check", table)
+    assert "Names of places, carried along unchanged: sokak_1; place\n" in out
+    assert "Unknown columns, carried along unchanged: owner\n" in out
 
 
 def test_many_rejected_rows_are_counted_by_fault(call, table):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.config import Run
+from per_obspy.config import Run, checked, in_language
 from per_obspy.config.commented import parsed_changes
 from per_obspy.errors import CatalogError
 
@@ -75,3 +75,12 @@ def test_a_wrong_change_is_one_line_with_the_nearest_key(text, message):
     assert message in str(caught.value)
     assert str(caught.value).startswith("--set: ")
     assert "\n" not in str(caught.value)
+
+
+def test_another_language_keeps_the_rest_of_the_report():
+    # would catch: --language loses the background of the map
+    content = {"language": "es", "background": "a.pmtiles", "revision": 3}
+    run = checked(Run, {"name": "a", "output": "b", "simulation": "c", "report": content})
+    report = in_language(run, "en").report
+    assert report == run.report.model_copy(update={"language": "en"})
+    assert in_language(run, None) is run

@@ -45,6 +45,22 @@ def table(folder, name):
     return pd.read_parquet(folder / "out" / f"{name}.parquet")
 
 
+def test_buildings_of_unknown_gaps_stand_before_those_that_hit_nobody(copied):
+    # would catch: whatever is to be measured comes after hundreds of buildings of severity 0
+    pairs = pd.read_csv(copied / "out" / "pairs.csv", dtype=str)
+    pairs.loc[::4, "gap"] = ""
+    pairs.to_csv(copied / "pairs.csv", index=False)
+    screened(copied, '[pairs]\nfile = "pairs.csv"\n')
+    buildings, risk = table(copied, "buildings"), table(copied, "risk")
+    unknown = risk.loc[risk["gap"].isna(), ["building_id_1", "building_id_2"]]
+    beside = buildings["building_id"].isin(unknown.to_numpy().ravel())
+    spared = buildings[(buildings["severity"] == 0.0) & ~beside]
+    to_measure = buildings[buildings["severity"].isna()]
+    assert len(spared) > 2
+    assert len(to_measure) > 2
+    assert to_measure["rank"].max() < spared["rank"].min()
+
+
 def test_every_pair_is_one_interface_and_every_building_one_row(finished):
     folder, record = finished
     pairs, rows, buildings = (table(folder, name) for name in ("risk", "rows", "buildings"))

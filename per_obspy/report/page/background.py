@@ -3,7 +3,7 @@
 import re
 import sqlite3
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.errors import CatalogError, shortened
+from per_obspy.errors import CatalogError, reason_of, shortened
 from per_obspy.files import unreadable_reason
 from per_obspy.reader_process import BeyondLimits, Limits, read_tiles_apart
 
@@ -63,6 +63,7 @@ def require_background(path: Path | None) -> None:
     """
     if path is None:
         return
+    # Layers are those of footprints
     if path.suffix.lower() not in TILES:
         from per_obspy.inventory.footprints.layer_files import require_layer_file
 
@@ -76,6 +77,7 @@ def require_background(path: Path | None) -> None:
     if not head.startswith(beginning):
         error = ValueError(f"it begins with {shortened(head[:20].decode('latin-1'))!r}")
         raise CatalogError(str(path), unreadable_reason(path, kind, error))
+    # A copy that was interrupted
     size, stated = path.stat().st_size, _stated_size(head.ljust(127, b"\0"))
     if size < max(stated, 127):
         raise CatalogError(str(path), f"is cut short: it has {size} of {stated} bytes")
@@ -117,6 +119,7 @@ def read_background(
     high = np.array([longitude.max(), latitude.max()])
     margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
     box = (*(low - margin).tolist(), *(high + margin).tolist())
+    # From the file to lines of the page
     if path.suffix.lower() in TILES:
         shapes, credit = _tile_shapes(path, layers, box)
     else:
@@ -145,7 +148,6 @@ def _layer_shapes(path: Path, layers: Sequence[str]) -> Shapes:
 def _tile_shapes(path: Path, layers: Sequence[str], box: Sequence[float]) -> tuple[Shapes, str]:
     """Return lines of an archive in degrees, else its outlines, and who made it."""
     import pyproj
-    import shapely
 
     from per_obspy.inventory.footprints.layers import polygons, transformed
 
@@ -162,13 +164,18 @@ def _tile_shapes(path: Path, layers: Sequence[str], box: Sequence[float]) -> tup
     except BeyondLimits as error:
         raise CatalogError(str(path), f"{error}: damaged, too large, or made to harm") from error
     shapes = polygons(wkb)
-    kinds = shapely.GeometryType.LINESTRING, shapely.GeometryType.MULTILINESTRING
-    is_line = np.isin(shapely.get_type_id(shapes), kinds)
-    # Streets say where one is; outlines of woods and fields would hide them
-    lines = shapes[is_line] if is_line.any() and not layers else shapes
-    cut = _without_edges(_as_lines(lines), side)
+    cut = _without_edges(_as_lines(shapes if layers else _streets(shapes)), side)
     back = pyproj.Transformer.from_crs(*projection[::-1], always_xy=True)
     return transformed(cut, back), credit
+
+
+def _streets(shapes: Shapes) -> Shapes:
+    """Return the lines among shapes if there are any: outlines of fields would hide them."""
+    import shapely
+
+    kinds = shapely.GeometryType.LINESTRING, shapely.GeometryType.MULTILINESTRING
+    is_line = np.isin(shapely.get_type_id(shapes), kinds)
+    return shapes[is_line] if is_line.any() else shapes
 
 
 def read_tiles(
@@ -196,27 +203,38 @@ def read_tiles(
         _refuse_programs(path)
         with literal_path(path) as plain:
             names = [str(name) for name, _ in pyogrio.list_layers(plain).tolist()]
-            if absent := [name for name in layers if name not in names]:
-                problem = f"no layer {absent[0]!r} (layers found: {', '.join(names) or 'none'})"
-                raise CatalogError(str(path), problem)
-            if not names:
-                raise CatalogError(str(path), "holds no vector tiles: pictures are no lines")
-            facts: dict[str, Any] = pyogrio.read_info(plain, layer=names[0])["dataset_metadata"]
-            # The finest level of which the region has few tiles
-            size = max(corners[2] - corners[0], corners[3] - corners[1], 1.0)
-            wanted = int(np.log2(MOST_TILES * EQUATOR / size))
-            level = int(np.clip(wanted, int(facts["minzoom"]), int(facts["maxzoom"])))
+            chosen = _chosen_layers(path, layers, names)
+            # Layers have one description
+            facts: dict[str, Any] = pyogrio.read_info(plain, layer=chosen[0])["dataset_metadata"]
+            level = _level(facts, corners)
+            # The stream of Arrow would not report the errors of tiles
             options = {"ZOOM_LEVEL": str(level), "CLIP": "YES", "bbox": corners, "columns": []}
-            tables = [
-                pyogrio.raw.read_arrow(plain, layer=name, **options)[1] for name in layers or names
-            ]
+            wkb = [pyogrio.raw.read(plain, layer=name, **options)[2] for name in chosen]
+    except CatalogError:
+        raise
     except (RuntimeError, ValueError, TypeError, KeyError, sqlite3.Error) as error:
-        raise CatalogError(str(path), unreadable_reason(path, kind, error)) from error
-    wkb = pa.concat_arrays(
-        [chunk.cast(pa.large_binary()) for table in tables for chunk in table.column(0).chunks]
-        or [pa.array([], pa.large_binary())]
-    )
-    return wkb, EQUATOR / 2.0**level, str(facts.get("attribution", ""))
+        problem = f"cannot be read as {kind}: {reason_of(error)}"
+        raise CatalogError(str(path), shortened(problem)) from error
+    # As bytes, which are sent to the other process
+    shapes = pa.array(np.concatenate(wkb), pa.large_binary())
+    return shapes, EQUATOR / 2.0**level, str(facts.get("attribution", ""))
+
+
+def _chosen_layers(path: Path, layers: Sequence[str], names: Sequence[str]) -> Sequence[str]:
+    """Return the requested layers of an archive, all without a request."""
+    if not names:
+        raise CatalogError(str(path), "holds no vector tiles: pictures are no lines")
+    if absent := [name for name in layers if name not in names]:
+        problem = f"no layer {absent[0]!r} (layers found: {', '.join(names)})"
+        raise CatalogError(str(path), problem)
+    return layers or names
+
+
+def _level(facts: Mapping[str, Any], corners: Sequence[float]) -> int:
+    """Return the finest level of an archive of which a region has few tiles."""
+    size = max(corners[2] - corners[0], corners[3] - corners[1], 1.0)
+    wanted = int(np.log2(MOST_TILES * EQUATOR / size))
+    return int(np.clip(wanted, int(facts["minzoom"]), int(facts["maxzoom"])))
 
 
 def _refuse_programs(path: Path) -> None:
@@ -274,6 +292,7 @@ def _near(lines: Shapes, box: Sequence[float]) -> Shapes:
     """Return the parts of lines (degrees) in a box, which may reach beyond 180 degrees."""
     import shapely
 
+    # Longitudes of a file end at 180 degrees
     bounds = shapely.bounds(lines)
     lines = lines[np.isfinite(bounds).all(axis=1)]
     if box[2] > 180.0:
@@ -304,6 +323,7 @@ def _packed(lines: Shapes) -> list[list[int]]:
     """Return lines (degrees) as whole steps."""
     import shapely
 
+    # Steps within each line; those of nothing are left out
     corners, line = shapely.get_coordinates(lines, return_index=True)
     whole = np.rint(corners / UNIT).astype(np.int64)
     is_first = np.concatenate([[True], line[1:] != line[:-1]])

@@ -83,8 +83,7 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
         return found
     # Corners near the places, of which few enough are kept
     world, places = _world(), np.stack([longitude[known], latitude[known]], axis=1)
-    middle = 0.5 * float(places[:, 0].min() + places[:, 0].max())
-    corners = np.stack([beside(world.corners[:, 0], middle), world.corners[:, 1]], axis=1)
+    corners = _beside_places(world.corners, places)
     near = _near(corners, places)
     stride = 1 + int(near.sum()) // MOST_CORNERS
     # Line by line, with its index of the first corner
@@ -109,6 +108,7 @@ def towns_around(
         return []
     places = np.stack([longitude[known], latitude[known]], axis=1)
     low, high = _box(places)
+    # First the region itself
     edges = (places.min(axis=0) - AMID, places.max(axis=0) + AMID)
     towns = largest_towns(edges[0].tolist(), edges[1].tolist(), most)
     return list(dict.fromkeys([*towns, *largest_towns(low.tolist(), high.tolist(), most)]))[:most]
@@ -117,6 +117,12 @@ def towns_around(
 def beside(longitude: FloatArray, middle: float) -> FloatArray:
     """Return longitudes within 180 degrees of the middle of a map."""
     return np.asarray(middle + (longitude - middle + 180.0) % 360.0 - 180.0)
+
+
+def _beside_places(corners: FloatArray, places: FloatArray) -> FloatArray:
+    """Return corners with longitudes within 180 degrees of the middle of places."""
+    middle = 0.5 * float(places[:, 0].min() + places[:, 0].max())
+    return np.stack([beside(corners[:, 0], middle), corners[:, 1]], axis=1)
 
 
 def _near(corners: FloatArray, places: FloatArray) -> NDArray[np.bool_]:

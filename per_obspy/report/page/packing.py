@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
 from per_obspy.errors import shortened
+from per_obspy.inventory.places import place_columns
 
 #: Bits of the fraction of a number that are stored: four digits, which is more than any is known.
 FRACTION_BITS = 13
@@ -174,16 +175,6 @@ MOST_BYTES = 1_500_000
 #: Columns for the export: wide tables would make large pages.
 MOST_COLUMNS = 300
 
-#: Names of columns that hold names of places, without _1 and _2 and the prefix of OpenStreetMap.
-PLACE_NAMES = frozenset(
-    (
-        *("address", "street", "housenumber", "place", "city", "town", "village", "hamlet"),
-        *("district", "suburb", "neighbourhood", "neighborhood", "quarter", "municipality"),
-        *("county", "province", "region", "postcode", "calle", "ciudad", "barrio", "colonia"),
-        *("municipio", "distrito", "canton", "provincia", "localidad", "direccion"),
-    )
-)
-
 
 def pack_export(pairs: pd.DataFrame, known: Collection[str]) -> PackedTable:
     """
@@ -250,7 +241,8 @@ def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
     >>> addresses(pd.DataFrame({"street_1": ["Calle 5"], "addr:city_1": ["Lima"]})).tolist()
     ['Calle 5, Lima']
     """
-    names = [name for name in pairs if _is_place(str(name))]
+    found = place_columns(map(str, pairs))
+    names = [name for name in pairs if str(name) == "place" or str(name) in found]
     if not names:
         return None
     # What is missing is empty
@@ -263,9 +255,3 @@ def _joined(names: Iterable[object]) -> str:
     """Join names in their order, without repetition."""
     texts = dict.fromkeys(str(name).strip() for name in names)
     return ", ".join(text for text in texts if text)
-
-
-def _is_place(name: str) -> bool:
-    """Return whether a column contains names of places, by its name."""
-    stem = name.lower().removesuffix("_1").removesuffix("_2").rsplit(":", 1)[-1]
-    return stem in PLACE_NAMES

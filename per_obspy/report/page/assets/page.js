@@ -28,10 +28,11 @@ class Page {
 
   whole(value) { return this.number(value, 0); }
 
-  // A number with at most four digits; tiny ones would have dozens of zeros
+  // A count, or a number with at most three digits; tiny ones would have dozens of zeros
   short(value) {
+    if (Number.isInteger(value)) return this.whole(value);
     if (value !== 0 && Math.abs(value) < 0.001) return `< ${this.number(0.001, 3)}`;
-    return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4, useGrouping: "always" });
+    return value.toLocaleString(this.content.language, { maximumSignificantDigits: 3, useGrouping: "always" });
   }
 
   // A probability in percent: 0 and 100 only where it is exactly that
