@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
     from per_obspy.inventory.files.formats import PairFile
+    from per_obspy.inventory.footprints.layer_files import Box
     from per_obspy.results.coverage import Search
 
 
@@ -168,6 +169,13 @@ def find_pairs(
         list[str] | None,
         typer.Option(help="Column of any other quantity, such as period=T1; may be repeated."),
     ] = None,
+    bbox: Annotated[
+        str | None,
+        typer.Option(
+            help="Box W,S,E,N in degrees: only buildings that touch it, of GeoParquet with a "
+            "column bbox, as Overture's; only the parts of the file that hold it are read."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -183,10 +191,24 @@ def find_pairs(
     given = {"building_id": id_column, "height": height_column, "storeys": storeys_column}
     columns = {name: known for name, known in given.items() if known is not None}
     columns |= _named_columns(column or [])
-    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns)
+    box = None if bbox is None else parsed_box(bbox)
+    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns, box)
     search = write_search(found, output)
     _print_footprint_pairs(found.pairs, search, output, as_json)
     stop_if_nothing(len(found.pairs))
+
+
+def parsed_box(text: str) -> "Box":
+    """Return west, south, east and north of an option, degrees."""
+    try:
+        west, south, east, north = map(float, text.split(","))
+    except ValueError:
+        west = east = south = north = 0.0
+    # NaN is not within any limit
+    if not (-180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0):
+        problem = f"{text!r} is not W,S,E,N in degrees with W < E and S < N"
+        raise typer.BadParameter(problem, param_hint="--bbox")
+    return west, south, east, north
 
 
 def _named_columns(options: "Sequence[str]") -> dict[str, str]:

@@ -26,6 +26,7 @@ from per_obspy.inventory.cells import NOTES
 from per_obspy.inventory.checking import Rejections, checked_pairs
 from per_obspy.inventory.contact_height import floor_offset
 from per_obspy.inventory.footprints.building_columns import building_columns
+from per_obspy.inventory.footprints.layer_files import Box
 from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, read_layer, transformed
 from per_obspy.inventory.footprints.neighbours import IntArray, Outlines, neighbours
 from per_obspy.inventory.footprints.raw_layer import Geometries
@@ -152,8 +153,13 @@ def find_footprint_pairs(
     layer: str | None = None,
     gap_std: float | None = None,
     columns: Mapping[str, str] | None = None,
+    box: Box | None = None,
 ) -> FootprintPairs:
-    """Find pairs as :func:`pairs_from_footprints` does, and keep the buildings."""
+    """
+    Find pairs as :func:`pairs_from_footprints` does, and keep the buildings.
+
+    With ``box`` (west, south, east, north, degrees) only buildings that touch it are read.
+    """
     largest = checks.number("distance", distance, checks.positive)
     _require_within("distance", largest, "gap")
     if gap_std is not None:
@@ -161,7 +167,7 @@ def find_footprint_pairs(
         _require_within("gap_std", gap_std, "gap_std")
     # Footprints, without those that repeat another
     source = str(path)
-    buildings, rejected = _usable_buildings(path, layer, columns or {})
+    buildings, rejected = _usable_buildings(path, layer, columns or {}, box)
     buildings, outlines = projected(buildings, source)
     pairs = neighbours(outlines, largest)
     if pairs.empty:
@@ -189,10 +195,10 @@ def _require_within(name: str, length: float, column: str) -> None:
 
 
 def _usable_buildings(
-    path: str | Path, layer: str | None, columns: Mapping[str, str]
+    path: str | Path, layer: str | None, columns: Mapping[str, str], box: Box | None
 ) -> tuple[Buildings, tuple[Rejection, ...]]:
     """Return the buildings of a layer under the names of the schema, and features that are none."""
-    outlines, attributes, lost = read_layer(path, layer)
+    outlines, attributes, lost = read_layer(path, layer, box)
     table = building_columns(attributes, columns, str(path))
     buildings, repeated = without_repetitions(outlines, table, str(path))
     rejected, usable = (*lost, *repeated), len(buildings.outlines)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet
 
 from per_obspy.errors import CatalogError, TryLater, shortened
@@ -77,7 +78,11 @@ HEAD = 1 << 20
 LARGEST, LARGEST_RATIO, _SMALL = 4 << 30, 200, 64 << 20
 
 
-def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
+#: West, south, east and north of a box, degrees.
+Box = tuple[float, float, float, float]
+
+
+def read_raw_layer(file: Path, layer: str | None, box: Box | None = None) -> RawLayer:
     """
     Read a layer by the reader of the file's suffix.
 
@@ -89,6 +94,9 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
         lines of GeoJSON, which may be packed by gzip.
     layer : str or None
         Name of the layer, for files that have several.
+    box : tuple of float, optional
+        Only features whose own box touches this one, of GeoParquet in degrees; features are
+        numbered among them.
 
     Raises
     ------
@@ -96,12 +104,14 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
         If the file is missing, or cannot be read as its suffix indicates.
     """
     require_layer_file(file)
+    if box is not None and file.suffix.lower() not in (".parquet", ".geoparquet"):
+        raise CatalogError(str(file), "a box needs GeoParquet, in longitude and latitude")
     # The slowest, areas of OpenStreetMap, take 2 s and 20 times their place in memory for each MiB
     # of .osm.pbf (reasoned)
     size = file.stat().st_size
     limits = Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
     try:
-        raw: RawLayer = read_layer_apart(limits, _read, file, layer)
+        raw: RawLayer = read_layer_apart(limits, _read, file, layer, box)
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
     return raw
@@ -148,7 +158,7 @@ def _wrong_beginning(file: Path) -> str:
     return ""
 
 
-def _read(file: Path, layer: str | None) -> RawLayer:
+def _read(file: Path, layer: str | None, box: Box | None = None) -> RawLayer:
     """Read a layer in the process of readers; messages name the file that may be packed."""
     source = str(file)
     try:
@@ -166,7 +176,9 @@ def _read(file: Path, layer: str | None) -> RawLayer:
             if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
                 return _read_gdal(plain, layer)
             readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
-            return readers.get(suffix, _read_geoparquet)(plain, source)
+            if suffix in readers:
+                return readers[suffix](plain, source)
+            return _read_geoparquet(plain, source, box)
     except TryLater:
         raise
     except OSError as error:
@@ -351,14 +363,41 @@ def _declared_system(file: Path) -> str | None:
         return json.dumps(declared)
 
 
-def _read_geoparquet(file: Path, source: str) -> RawLayer:
-    """Read a GeoParquet file."""
+def _read_geoparquet(file: Path, source: str, box: Box | None = None) -> RawLayer:
+    """Read a GeoParquet file, or its features in a box."""
     try:
-        table = _without_nesting(pa.parquet.read_table(file.absolute()))
+        # Only the parts of the file that may hold the box
+        chosen = None if box is None else _touching(file, source, box)
+        table = _without_nesting(pa.parquet.read_table(file.absolute(), filters=chosen))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(source, unreadable_reason(file, "Parquet table", error)) from error
     name, crs = _geometry_column(source, table)
+    if box is not None and not is_in_degrees(crs):
+        raise CatalogError(source, "a box needs outlines in longitude and latitude")
     return _raw_layer(source, table, table.column_names.index(name), crs)
+
+
+def _touching(file: Path, source: str, box: Box) -> pc.Expression:
+    """Return the filter of rows whose column of boxes, as Overture has it, touches a box."""
+    # A box in another form is none
+    schema = pa.parquet.read_schema(file.absolute())
+    kind = schema.field("bbox").type if "bbox" in schema.names else pa.null()
+    names = {field.name for field in kind} if pa.types.is_struct(kind) else set()
+    if not names >= {"xmin", "xmax", "ymin", "ymax"}:
+        raise CatalogError(source, "a box needs a column bbox with xmin, xmax, ymin and ymax")
+    west, south, east, north = box
+    across = (pc.field("bbox", "xmin") <= east) & (pc.field("bbox", "xmax") >= west)
+    return across & (pc.field("bbox", "ymin") <= north) & (pc.field("bbox", "ymax") >= south)
+
+
+def is_in_degrees(crs: Any) -> bool:
+    """Return whether a reference system is longitude and latitude, in this order."""
+    import pyproj
+
+    try:
+        return bool(pyproj.CRS.from_user_input(crs).is_geographic)
+    except (pyproj.exceptions.CRSError, TypeError, ValueError, AttributeError):
+        return False
 
 
 def _geometry_column(source: str, table: pa.Table) -> tuple[str, Any]:

@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.footprints.layer_files import read_raw_layer
+from per_obspy.inventory.footprints.layer_files import Box, read_raw_layer
 from per_obspy.inventory.footprints.raw_layer import Geometries, RawLayer, as_wkb
 
 #: Features per block, to bound memory.
@@ -42,7 +42,7 @@ class Layer(NamedTuple):
     rejected: tuple[Rejection, ...]
 
 
-def read_layer(path: str | Path, layer: str | None = None) -> Layer:
+def read_layer(path: str | Path, layer: str | None = None, box: Box | None = None) -> Layer:
     """
     Read the footprints of a file.
 
@@ -53,6 +53,8 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
         source in ``docs/importers.md``.
     layer : str, optional
         Name of the layer, for files that have several.
+    box : tuple of float, optional
+        West, south, east and north of the buildings, degrees; of GeoParquet only.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
         contains no polygons.
     """
     file = Path(path)
-    raw = read_raw_layer(file, layer)
+    raw = read_raw_layer(file, layer, box)
     _require_outlines(file, raw)
     transformer, is_projected = to_degrees(file, raw.crs)
     # Outlines that can be used and reasons for the others, block by block

@@ -4,7 +4,9 @@ import gzip
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.parquet
 import pyogrio
 import pytest
 import shapely
@@ -12,6 +14,7 @@ from building_samples import (
     geometries,
     google,
     microsoft_packed,
+    osm_geoparquet,
     osm_xml,
     overture,
     small_town,
@@ -116,6 +119,36 @@ def test_names_sources_and_boxes_of_overture(tmp_path):
     assert attributes["names"].fillna("").tolist() == ["House", "", "", ""]
     assert attributes["sources"].tolist() == ["OpenStreetMap"] * 4
     assert "bbox" not in attributes
+
+
+def test_a_box_keeps_the_buildings_that_touch_it(tmp_path):
+    # would catch a box that cuts buildings off, and one that is passed over
+    town = small_town()
+    path = overture(tmp_path, town)
+    west, south, east, north = shapely.bounds(town.outlines[1])
+    inside = shapely.intersects(town.outlines, shapely.box(west, south, east, north))
+    raw = read_raw_layer(path, None, (west, south, east, north))
+    assert 0 < inside.sum() < len(inside)
+    assert raw.attributes["id"].to_pylist() == np.array(town.names)[inside].tolist()
+    whole = read_raw_layer(path, None, (-180.0, -90.0, 180.0, 90.0))
+    assert whole.attributes.equals(read_raw_layer(path, None).attributes)
+    assert len(read_raw_layer(path, None, (0.0, 0.0, 1e-3, 1e-3)).wkb) == 0
+
+
+def test_a_box_needs_degrees_and_a_column_of_boxes(tmp_path):
+    box = (-180.0, -90.0, 180.0, 90.0)
+    town = small_town()
+    with pytest.raises(CatalogError, match="a box needs a column bbox"):
+        read_raw_layer(osm_geoparquet(tmp_path, town), None, box)
+    with pytest.raises(CatalogError, match="a box needs GeoParquet"):
+        read_raw_layer(osm_xml(tmp_path, town), None, box)
+    path = overture(tmp_path, town)
+    table = pa.parquet.read_table(path)
+    geo = json.loads(table.schema.metadata[b"geo"])
+    geo["columns"]["geometry"]["crs"] = "EPSG:32719"
+    pa.parquet.write_table(table.replace_schema_metadata({"geo": json.dumps(geo)}), path)
+    with pytest.raises(CatalogError, match="outlines in longitude and latitude"):
+        read_raw_layer(path, None, box)
 
 
 def test_maps_become_json_and_other_columns_stay():
