@@ -12,7 +12,12 @@ import numba
 from filelock import FileLock
 from numba.core.caching import FunctionCache
 
-from per_obspy.kernels._linking import FunctionCompiler, LeanCompiler, LinkedFunction
+from per_obspy.kernels._linking import (
+    FunctionCompiler,
+    LeanCompiler,
+    LinkedFunction,
+    VectorCompiler,
+)
 
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
@@ -104,12 +109,12 @@ def _warn_without_cache() -> None:
 
 kernel = _compiler(FunctionCompiler)
 
-#: For kernels that allocate no memory: without reference counts, which cost short kernels more
+#: For functions that allocate no memory, one code for all constants: without reference counts, which cost short kernels more
 #: than arithmetic.
 lean = _compiler(LeanCompiler, _nrt=False)
 
 #: The same for loops over lanes, which become vectors before they are merged into their callers.
-vectorised = _compiler(FunctionCompiler, _nrt=False)
+vectorised = _compiler(VectorCompiler, _nrt=False)
 
 #: For small kernels of inner loops, which the compiler otherwise leaves out of line as soon as
 #: their callers grow.

@@ -12,8 +12,10 @@ Internals used (the same in Numba 0.61 to 0.68): the library of a compiler's sta
 ``Dispatcher.compile``.
 """
 
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
+from llvmlite.binding import Linkage
 from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -23,34 +25,69 @@ from numba.core.types import unliteral
 
 
 class FunctionLibrary(JITCodeLibrary):
-    """Intermediate code of a function and of those that it calls, optimised."""
+    """
+    Intermediate code of a function alone, linked and optimised with its callers.
+
+    Linked to all that it calls, it would be copied as often as the chain of calls above it is long;
+    optimised, everything below it would be optimised again.
+    """
 
     def finalize(self) -> None:
-        """Link and optimise; no machine code is generated."""
-        for library in dict.fromkeys(self._linking_libraries):
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        self._optimise()
+        """Leave all to the callers, of which several may bring this code into one kernel."""
+        for function in self.own_code.functions:
+            if not function.is_declaration:
+                function.linkage = Linkage.linkonce_odr
         self._finalized = True
 
-    def _optimise(self) -> None:
-        self._optimize_final_module()
+    @property
+    def own_code(self) -> Any:
+        """Code of the function, with that of what it calls once a kernel has asked for both."""
+        return self._final_module
 
-
-class LeanLibrary(FunctionLibrary):
-    """The same code, of which the optimisation is left to the kernel."""
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            _link(self._final_module, self._linking_libraries)
+        return super()._get_module_for_linking()
 
     def _optimize_functions(self, module: Any) -> None:
         # Only the layout of data, which all linked modules share
         module.data_layout = self._codegen._data_layout
 
-    def _optimise(self) -> None:
-        pass
+
+class VectorLibrary(JITCodeLibrary):
+    """Intermediate code of a function and of all that it calls, optimised."""
+
+    def finalize(self) -> None:
+        """Link and optimise; no machine code is generated."""
+        _link(self._final_module, self._linking_libraries)
+        self._optimize_final_module()
+        self._finalized = True
+
+
+def _link(module: Any, libraries: Iterable[Any]) -> None:
+    """Link some libraries, and all that they call, to a module."""
+    parts: dict[Any, None] = {}
+    _collect(libraries, parts)
+    # Callers first: code that nothing asks for yet would be left out
+    for part in reversed(parts):
+        is_own = isinstance(part, FunctionLibrary)
+        code = part.own_code if is_own else part._get_module_for_linking()
+        module.link_in(code, preserve=True)
+
+
+def _collect(libraries: Iterable[Any], parts: dict[Any, None]) -> None:
+    """Add libraries, each after those that it calls."""
+    for library in libraries:
+        if library not in parts:
+            if isinstance(library, FunctionLibrary):
+                _collect(library._linking_libraries, parts)
+            parts[library] = None
 
 
 class FunctionCompiler(Compiler):
     """Numba's compiler up to intermediate code."""
 
-    library: ClassVar[type[FunctionLibrary]] = FunctionLibrary
+    library: ClassVar[type[JITCodeLibrary]] = FunctionLibrary
 
     def define_pipelines(self) -> Any:
         """Return the passes, which write to a library of this class."""
@@ -63,9 +100,13 @@ class FunctionCompiler(Compiler):
 
 
 class LeanCompiler(FunctionCompiler):
-    """The same for scalar functions, which are optimised with their callers only."""
+    """The same for functions of which one code serves all constants of a type."""
 
-    library = LeanLibrary
+
+class VectorCompiler(FunctionCompiler):
+    """The same for loops that become vectors before they are merged into their callers."""
+
+    library = VectorLibrary
 
 
 class LinkedFunction(CPUDispatcher):
@@ -77,7 +118,7 @@ class LinkedFunction(CPUDispatcher):
     kernel : Dispatcher
         The function as a kernel that Python calls.
     compiler : type
-        `FunctionCompiler` or `LeanCompiler`.
+        `FunctionCompiler`, `LeanCompiler` or `VectorCompiler`.
     """
 
     #: Set by Numba.

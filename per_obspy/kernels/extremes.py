@@ -20,7 +20,8 @@ def smallest(values):
     least = bits[0]
     for k in range(bits.size):
         least = min(least, bits[k])
-    number = np.full(1, least)
+    number = np.empty(1, np.int64)
+    number[0] = least
     return number.view(np.float64)[0]
 
 

@@ -9,7 +9,7 @@ omega²``, time as phase.
 """
 
 from per_obspy.kernels._aligned import aligned_line, store_line
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import kernel, vectorised
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
 
@@ -91,15 +91,14 @@ def _stride_kernel(stride, steps):
     """
     strides = steps // stride
 
-    @kernel
-    def run(north, east, begin, starts, table, checkpoints):
-        # Of a size and with places that the compiler knows: it makes vectors
-        t = aligned_line(table, PHASE, MAXIMA_LANES)
+    @vectorised
+    def run(north, east, begin, starts, t, checkpoints):
         for first in range(0, north.size - 1, TILE):
             tile = first // TILE
             _open_tile(north[first], east[first], begin + tile, starts, t, checkpoints[tile])
             for i in range(first, first + TILE, steps):
                 for lane in range(MAXIMA_LANES):
+                    # State before the strides, and the largest values so far
                     u, z, p = t[U + lane], t[Z + lane], t[P + lane]
                     square, largest = t[LARGEST_SQUARE + lane], t[LARGEST + lane]
                     for number in range(strides):
@@ -110,6 +109,7 @@ def _stride_kernel(stride, steps):
                             # Acceleration along the oscillator's azimuth
                             p = t[NORTH + lane] * north[sample] + t[EAST + lane] * east[sample]
                             f, g = f + t[F + row] * p, g + t[G + row] * p
+                        # State after the stride
                         u, z = (
                             t[A11 + lane] * u + (t[A12 + lane] * z + f),
                             t[A21 + lane] * u + (t[A22 + lane] * z + g),
@@ -121,8 +121,6 @@ def _stride_kernel(stride, steps):
             for lane in range(MAXIMA_LANES):
                 checkpoints[tile, SQUARE, lane] = t[LARGEST_SQUARE + lane]
                 checkpoints[tile, DISPLACEMENT, lane] = t[LARGEST + lane]
-        # States at the end, for the next stretch
-        store_line(t, table, PHASE)
 
     return run
 
@@ -133,9 +131,13 @@ _by_four, _by_two, _by_one = _stride_kernel(4, 8), _stride_kernel(2, 4), _stride
 @kernel
 def run_strides(stride, north, east, begin, starts, table, checkpoints):
     """Advance a block of `MAXIMA_LANES` oscillators, each along its azimuth."""
+    # In one line with places that the compiler knows: it makes vectors
+    t = aligned_line(table, PHASE, MAXIMA_LANES)
     if stride == 4:
-        _by_four(north, east, begin, starts, table, checkpoints)
+        _by_four(north, east, begin, starts, t, checkpoints)
     elif stride == 2:
-        _by_two(north, east, begin, starts, table, checkpoints)
+        _by_two(north, east, begin, starts, t, checkpoints)
     else:
-        _by_one(north, east, begin, starts, table, checkpoints)
+        _by_one(north, east, begin, starts, t, checkpoints)
+    # States at the end, for the next stretch
+    store_line(t, table, PHASE)

@@ -184,6 +184,18 @@ def is_settled(row):
     return True
 
 
+@lean
+def _write_sample(row, total, motion, work, k):
+    """Write the state of the row and the work done on it at a sample."""
+    for i in range(row.shape[0]):
+        for column in range(motion.shape[2]):
+            motion[k, i, column] = row[i, U + column]
+        for column in range(work.shape[2]):
+            work[k, i, column] = total[i, column]
+        # impacts transfer energy too
+        work[k, i, WORK_TRANSFER] += row[i, TRANSFERRED]
+
+
 @kernel
 def run_history(acceleration, dt, refinement, row, log, motion, work):
     """
@@ -215,8 +227,8 @@ def run_history(acceleration, dt, refinement, row, log, motion, work):
     """
     duration = dt / refinement
     terms = taylor_terms(row, duration)
-    total = work[0].copy()
-    motion[0] = row[:, U : PLASTIC + 1]
+    total = np.zeros((row.shape[0], work.shape[2]))
+    _write_sample(row, total, motion, work, 0)
     for k in range(1, motion.shape[0]):
         # ground acceleration and its slope in this sampling interval; zero after the record
         slope = start = 0.0
@@ -232,8 +244,6 @@ def run_history(acceleration, dt, refinement, row, log, motion, work):
             segment = Segment(time, duration, start + slope * shift, slope, terms)
             if not advance_segment(row, log, total, segment):
                 return -k
-        # results at the sample; impacts transfer energy too
-        motion[k] = row[:, U : PLASTIC + 1]
-        work[k] = total
-        work[k, :, WORK_TRANSFER] += row[:, TRANSFERRED]
+        # results at the sample
+        _write_sample(row, total, motion, work, k)
     return motion.shape[0]

@@ -209,7 +209,8 @@ def _unequal_pairs(pairs):
 @kernel
 def _ring_down(dt, tile, block, table, checkpoints, moving, best):
     """Raise the largest values to those of the free vibration, tile by tile while one may grow."""
-    rest = np.zeros((2, TILE + 1))
+    # Of the layout of a stretch of the record: else all below would be compiled twice
+    rest = np.zeros((2, 2 * TILE))[:, : TILE + 1]
     quiet = np.zeros((1, 3, 2))
     windows = np.empty((2, PAIR_LANES), np.int64)
     steps = 0

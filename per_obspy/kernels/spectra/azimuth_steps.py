@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import inlined, kernel
+from per_obspy.kernels._jit import inlined, kernel, lean
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.oscillator.within_step import rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
@@ -318,7 +318,7 @@ def search_steps(steps, oscillator, directions, edges, best):
     raise_to_step_peaks(problems, azimuths, count, oscillator, best)
 
 
-@kernel
+@lean
 def _add_problems(step, first, directions, best, largest, problems, azimuths, count):
     """
     Add those azimuths of a group along which a step may hold more than their own maximum.

@@ -144,8 +144,7 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
     raise_to_tiles(checkpoints, peaks.size, largest)
     limits, marks, pushes = aligned(LIMITS, LANES), np.zeros(LANES, np.int64), np.empty(peaks.size)
     listed, group = np.zeros(LANES, np.int64), aligned(1, 11 * TOGETHER)[0]
-    _fill_pushes(acceleration, pushes)
-    strongest = pushes.max()
+    strongest = _fill_pushes(acceleration, pushes)
     for lane in range(LANES):
         limits[5, lane] = math.exp(STRIDE * dampings[lane] * phases[lane])
     _fill_limits(strongest, phases, dampings, largest, 0, LANES, limits)
@@ -203,7 +202,12 @@ def _open_group(table, checkpoints, tile, listed, first, count, group):
 
 @kernel
 def _fill_pushes(acceleration, pushes):
-    """Fill the largest sum of ``|a|`` over half a stride of each tile, by the trapezoidal rule."""
+    """
+    Fill the largest sum of ``|a|`` over half a stride of each tile, by the trapezoidal rule.
+
+    Return the largest of all tiles.
+    """
+    strongest = 0.0
     for tile in range(pushes.size):
         pushes[tile] = 0.0
         # Every half stride of the tile
@@ -211,6 +215,8 @@ def _fill_pushes(acceleration, pushes):
             ends = 0.5 * (abs(acceleration[i]) + abs(acceleration[i + 4]))
             inner = abs(acceleration[i + 1]) + abs(acceleration[i + 2]) + abs(acceleration[i + 3])
             pushes[tile] = max(pushes[tile], ends + inner)
+        strongest = max(strongest, pushes[tile])
+    return strongest
 
 
 @kernel
