@@ -51,6 +51,9 @@ _OF_ROWS = (
       for name in ("building_id", "building_number", "amplification", "amplification_alone")),
 )  # fmt: skip
 
+#: Columns of rows that interfaces leave to their pairs.
+_PLACES = ("longitude", "latitude")
+
 #: Columns by which an unknown gap is ranked.
 _UNKNOWN_BY = ("probability", "demand", "period_1", "period_2")
 
@@ -182,19 +185,18 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
         pq.ParquetFile(contacts.absolute(), pre_buffer=False) as second,
     ):
         carried = [name for name in (*OF_PAIRS, AREA) if name in second.schema_arrow.names]
+        unknown_by = [name for name in _UNKNOWN_BY if name in carried]
         # Both files have the same rows in the same groups
         for group in range(first.num_row_groups):
             table = first.read_row_group(group, columns=list(_OF_ROWS), use_threads=False)
             pairs = second.read_row_group(group, columns=carried, use_threads=False)
-            names = [name for name in _OF_ROWS if name not in ("longitude", "latitude")]
-            columns = {name: table[name] for name in names}
+            columns = {name: table[name] for name in _OF_ROWS if name not in _PLACES}
             columns |= directions(table["azimuth"], table["flags"])
             columns["area"] = _areas(table, pairs, totals)
             # Columns that the pair table does not have are empty
             empty = pa.nulls(pairs.num_rows, pa.float64())
             columns |= {name: pairs[name] if name in carried else empty for name in OF_PAIRS}
-            known = [name for name in _UNKNOWN_BY if name in carried]
-            columns[UNKNOWN] = velocity_of_unknown(pairs.select(known).to_pandas())
+            columns[UNKNOWN] = velocity_of_unknown(pairs.select(unknown_by).to_pandas())
             yield pa.table(columns)
 
 

@@ -62,12 +62,11 @@ def noise_spectra(
     noise, signal = noise - noise.mean(), shaking[: significant_samples(shaking)]
     # Amplitudes of both at the same frequencies; few lengths, so that smoothing weights are reused
     length = 2 ** (2 * max(noise.size, signal.size) - 1).bit_length()
-    frequencies = _centres(0.5 / dt)
-    centres = tuple(frequencies.tolist())
+    frequencies, step = _centres(0.5 / dt), 1 / (length * dt)
 
     def smooth(part: FloatArray) -> FloatArray:
         amplitudes = dt * np.abs(rfft(part * tukey(part.size, TAPERED), length))
-        return konno_ohmachi(amplitudes, 1 / (length * dt), centres, bandwidth)
+        return konno_ohmachi(amplitudes, step, tuple(frequencies.tolist()), bandwidth)
 
     # Noise over the length of the signal; carried on below one cycle in its window
     scaled = smooth(noise) * np.sqrt(signal.size / noise.size)

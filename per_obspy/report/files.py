@@ -373,6 +373,7 @@ def write_summaries(results: Results, folder: Path, report: Report) -> None:
 def write_lists(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
     """Write the worst pairs as KML and, where it is wanted, as a workbook."""
     stem, region = results.stem, results.region
+    # Each says of how many pairs it has the worst
     with report.tried(folder / f"{stem}.kml"):
         note = _extent(results, folder, KML_ROWS)
         write_kml(results.listed, region.classes, region.title, folder / f"{stem}.kml", note)

@@ -6,7 +6,7 @@ from; everything after that is :func:`per_obspy.report.files.write_report`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -58,6 +58,7 @@ def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Repor
     settings, folder, report = context.settings, context.folder, Report([], [])
     if files := table_files(folder):
         with report.tried(folder / WORST_PAIRS):
+            # The leading columns are those of the package
             with ranked_table(files) as table:
                 worst = table.first(PAGE_PAIRS, table.schema.names[: 2 * MOST_COLUMNS])
             write_drawings(page_drawings(settings, worst, stations), folder / WORST_PAIRS)
@@ -165,14 +166,23 @@ def _report_pairs(
     with ranked_table(table_files(folder), columns) as table:
         # The pieces may lack columns, the pairs of the page have all of them
         worst = worst_pairs(table, settings.totals)
-        pairs = PairTable(
-            table.pieces(), table.pairs, settings.totals, outlines, settings.report,
-            settings.geopackage, settings.spreadsheet,
-        )  # fmt: skip
+        pairs = _pair_table(settings, table.pieces(), table.pairs, settings.totals, outlines)
         results = replace(results, worst=worst, record=_record(worst, stations))
         write_report(results, pairs, folder, report)
     if settings.pmtiles:
         _write_tiles(folder / "risk.gpkg", report)
+
+
+def _pair_table(
+    settings: Run | Design | Ensemble,
+    pieces: Iterator[pd.DataFrame],
+    pairs: int,
+    totals: Totals,
+    outlines: Path | None,
+) -> PairTable:
+    """Return the pairs of a screening with the settings of what is written of them."""
+    files = settings.geopackage, settings.spreadsheet
+    return PairTable(pieces, pairs, totals, outlines, settings.report, *files)
 
 
 def _write_tiles(package: Path, report: Report) -> None:
@@ -267,14 +277,11 @@ def report_design(
         own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
         provenance=[_made_with(texts), _content_note([texts["page_design"]], texts)],
     )  # fmt: skip
-    pairs = PairTable(
-        iter([_with_flags(table)]), len(table), settings.totals, outlines_beside(settings.pairs),
-        settings.report, settings.geopackage, settings.spreadsheet,
-    )  # fmt: skip
+    pieces, outlines = iter([_with_flags(table)]), outlines_beside(settings.pairs)
+    pairs = _pair_table(settings, pieces, len(table), settings.totals, outlines)
     write_report(results, pairs, folder, report)
-    # Gaps for the target rate of a hazard
-    figure = folder / "figures" / "gap_for_target.png"
     if "gap_for_target" in table:
+        figure = folder / "figures" / "gap_for_target.png"
         with report.tried(figure):
             draw_gaps_for_target(table, settings.target_rate, figure)
     return report
@@ -325,10 +332,7 @@ def report_ensemble(
     )  # fmt: skip
     # Buildings and outlines are those of the runs
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))
-    pairs = PairTable(
-        pieces, coverage.screened, runs.totals(), runs.outlines(), settings.report,
-        settings.geopackage, settings.spreadsheet,
-    )  # fmt: skip
+    pairs = _pair_table(settings, pieces, coverage.screened, runs.totals(), runs.outlines())
     write_report(results, pairs, folder, report)
     return report
 

@@ -119,6 +119,7 @@ class ScenarioRuns:
         tables = list[pd.DataFrame]()
         for name, run in self.runs.items():
             if len(table := read_stations(run.folder / "stations.csv")):
+                # A run has its radii with its worst pairs
                 table = with_radii(table, read_drawings(run.folder / WORST_PAIRS).radii)
                 tables.append(table.assign(station=table["station"] + f" ({name})"))
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()

@@ -259,6 +259,7 @@ def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
         impacts[name].to_numpy()
         for name in ("time", "counted", "velocity_before_1", "velocity_before_2")
     )
+    # Equal ones in the order of time
     speed = one - two
     order = np.argsort(-speed, kind="stable")
     fastest = order[counted[order]][:MOST_IMPACTS]

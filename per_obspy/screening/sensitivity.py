@@ -6,7 +6,7 @@ standard deviation on both sides of the median of a normal variable. Everything 
 stays as uncertain as it is, and the row is computed again as the risk table computes it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -104,28 +104,29 @@ def _variants(known: pd.DataFrame, inputs: dict[str, Ends]) -> pd.DataFrame:
     """Return the rows as they are, and with each input at both of its values, as a pair table."""
     given = _as_given(known)
     # Every variant is a pair with a name of its own
-    variants = [given.assign(pair_id=_names(known, "", 0))]
+    variants = [given.assign(pair_id=_names(range(len(known)), "", 0))]
     for name, (low, high, varies) in inputs.items():
         for side, value in enumerate((low, high)):
-            changed = _with_value(given, name, value).assign(pair_id=_names(known, name, side))
+            names = _names(range(len(known)), name, side)
+            changed = _with_value(given, name, value).assign(pair_id=names)
             variants.append(changed[varies])
     return pd.concat(variants, ignore_index=True)
 
 
-def _names(rows: pd.DataFrame, name: str, side: int) -> list[str]:
+def _names(rows: Iterable[int], name: str, side: int) -> list[str]:
     """Return names of variants: number of the row, input and side."""
-    return [f"{row} {name} {side}" for row in range(len(rows))]
+    return [f"{row} {name} {side}" for row in rows]
 
 
 def _found(known: pd.DataFrame, name: str, found: pd.DataFrame) -> BoolArray:
     """Return which rows have an outcome at both values: a spectrum may not reach one of them."""
-    ends = [pd.Index(_names(known, name, side)).isin(found.index) for side in (0, 1)]
+    ends = [pd.Index(_names(range(len(known)), name, side)).isin(found.index) for side in (0, 1)]
     return np.asarray(ends[0] & ends[1])
 
 
 def _same(known: pd.DataFrame, found: pd.DataFrame) -> BoolArray:
     """Return which rows have the probability of the risk table when they are computed again."""
-    again = found["probability"].reindex(_names(known, "", 0)).to_numpy(np.float64)
+    again = found["probability"].reindex(_names(range(len(known)), "", 0)).to_numpy(np.float64)
     # NaN of a pair that was rejected compares as false
     return np.asarray(np.abs(again - values(known, "probability")) <= TOLERANCE)
 
@@ -136,7 +137,8 @@ def _outcomes(
     """Yield the outcome of each chosen pair at both values of an input."""
     low, high, chosen = ends
     rows = np.flatnonzero(chosen)
-    sides = [found.loc[[f"{row} {name} {side}" for row in rows.tolist()]] for side in (0, 1)]
+    # Rows are named by pair, input and side
+    sides = [found.loc[_names(rows.tolist(), name, side)] for side in (0, 1)]
     chances = [values(side, "probability").tolist() for side in sides]
     states = [side["state"].astype(str).tolist() for side in sides]
     columns = (low[rows].tolist(), high[rows].tolist(), *chances, *states)
