@@ -109,8 +109,8 @@ def _warn_without_cache() -> None:
 
 kernel = _compiler(FunctionCompiler)
 
-#: For functions that allocate no memory, one code for all constants: without reference counts, which cost short kernels more
-#: than arithmetic.
+#: For functions that allocate no memory, one code for all constants: without reference counts,
+#: which cost short kernels more than arithmetic.
 lean = _compiler(LeanCompiler, _nrt=False)
 
 #: The same for loops over lanes, which become vectors before they are merged into their callers.
