@@ -90,6 +90,11 @@ class Report:
     faults: list[str]
     alert: str = ""
 
+    def joined(self, later: "Report") -> "Report":
+        """Return the files and faults of two parts, with the alert of the later one."""
+        files, faults = [*self.outputs, *later.outputs], [*self.faults, *later.faults]
+        return Report(files, faults, later.alert)
+
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
         """Note the files that a block writes, or one line on the fault that prevents them."""
@@ -360,6 +365,7 @@ def write_summaries(results: Results, folder: Path, report: Report) -> None:
 def write_lists(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
     """Write the worst pairs as KML and, where it is wanted, as a workbook."""
     stem, region = results.stem, results.region
+    # Both say how many pairs they leave out
     with report.tried(folder / f"{stem}.kml"):
         note = _extent(results, folder, KML_ROWS)
         write_kml(results.listed, region.classes, region.title, folder / f"{stem}.kml", note)
@@ -374,6 +380,7 @@ def _draw_figures(results: Results, folder: Path, report: Report) -> None:
     overview, walk = (folder / "figures" / f"{name}.png" for name in ("overview", "worst_pair"))
     with report.tried(overview):
         draw_overview(results.shown, results.region, overview)
+    # Equal circles explain nothing
     pair = differing_pair(results.worst)
     if results.record is not None and pair is not None:
         with report.tried(walk):

@@ -114,6 +114,7 @@ class ScenarioRuns:
     def stations(self) -> pd.DataFrame:
         """Return the stations of all runs, each with the name of its scenario."""
         tables = list[pd.DataFrame]()
+        # A run that only a map serves has none
         for name, run in self.runs.items():
             if len(table := read_stations(run.folder / "stations.csv")):
                 table = with_radii(table, read_drawings(run.folder / WORST_PAIRS).radii)

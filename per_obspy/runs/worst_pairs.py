@@ -260,6 +260,7 @@ def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
         for name in ("time", "counted", "velocity_before_1", "velocity_before_2")
     )
     speed = one - two
+    # Equal ones stay in their order
     order = np.argsort(-speed, kind="stable")
     fastest = order[counted[order]][:MOST_IMPACTS]
     rows: list[list[float]] = np.stack([time[fastest], speed[fastest]], axis=1).round(3).tolist()

@@ -136,7 +136,9 @@ def _outcomes(
     """Yield the outcome of each chosen pair at both values of an input."""
     low, high, chosen = ends
     rows = np.flatnonzero(chosen)
-    sides = [found.loc[[f"{row} {name} {side}" for row in rows.tolist()]] for side in (0, 1)]
+    # Rows of all pairs at one value, then at the other
+    names = [pd.Index(_names(known, name, side))[rows] for side in (0, 1)]
+    sides = [found.loc[one] for one in names]
     chances = [values(side, "probability").tolist() for side in sides]
     states = [side["state"].astype(str).tolist() for side in sides]
     columns = (low[rows].tolist(), high[rows].tolist(), *chances, *states)
