@@ -55,24 +55,30 @@ def noise_spectra(
     the noise is unknown: its lowest resolved amplitude is carried on. The acceleration, m/s2, is
     without its baseline; the bandwidth is that of the Konno-Ohmachi window, dimensionless.
     """
-    from scipy.signal.windows import tukey  # in workers only, see instrument_response
-
     # Noise before the onset, significant shaking after it
     noise, shaking = np.split(acceleration, [round(onset / dt)])
     noise, signal = noise - noise.mean(), shaking[: significant_samples(shaking)]
     # Amplitudes of both at the same frequencies; few lengths, so that smoothing weights are reused
     length = 2 ** (2 * max(noise.size, signal.size) - 1).bit_length()
-    frequencies, step = _centres(0.5 / dt), 1 / (length * dt)
+    frequencies = _centres(0.5 / dt)
+    centres = tuple(frequencies.tolist())
 
     def smooth(part: FloatArray) -> FloatArray:
-        amplitudes = dt * np.abs(rfft(part * tukey(part.size, TAPERED), length))
-        return konno_ohmachi(amplitudes, step, tuple(frequencies.tolist()), bandwidth)
+        amplitudes = dt * np.abs(rfft(_tapered(part), length))
+        return konno_ohmachi(amplitudes, 1 / (length * dt), centres, bandwidth)
 
     # Noise over the length of the signal; carried on below one cycle in its window
     scaled = smooth(noise) * np.sqrt(signal.size / noise.size)
     resolved = min(int(np.searchsorted(frequencies, 1 / (noise.size * dt))), frequencies.size - 1)
     scaled[:resolved] = np.maximum(scaled[:resolved], scaled[resolved])
     return NoiseSpectra(frequencies, smooth(signal), scaled)
+
+
+def _tapered(part: FloatArray) -> FloatArray:
+    """Return samples that rise from zero and end there."""
+    from scipy.signal.windows import tukey  # in workers only, see instrument_response
+
+    return np.asarray(part * tukey(part.size, TAPERED))
 
 
 def _centres(nyquist: float) -> FloatArray:

@@ -100,6 +100,11 @@ class Report:
     faults: list[str]
     alert: str = ""
 
+    def joined(self, later: "Report") -> "Report":
+        """Return the files and faults of two parts, with the alert of the later one."""
+        files, faults = [*self.outputs, *later.outputs], [*self.faults, *later.faults]
+        return Report(files, faults, later.alert)
+
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
         """Note the files that a block writes, or one line on the fault that prevents them."""
@@ -373,7 +378,7 @@ def write_summaries(results: Results, folder: Path, report: Report) -> None:
 def write_lists(results: Results, folder: Path, spreadsheet: bool, report: Report) -> None:
     """Write the worst pairs as KML and, where it is wanted, as a workbook."""
     stem, region = results.stem, results.region
-    # Each says of how many pairs it has the worst
+    # Both say how many pairs they leave out
     with report.tried(folder / f"{stem}.kml"):
         note = _extent(results, folder, KML_ROWS)
         write_kml(results.listed, region.classes, region.title, folder / f"{stem}.kml", note)
@@ -393,6 +398,7 @@ def _draw_figures(results: Results, folder: Path, report: Report) -> None:
             used = results.stations[results.stations["state"] == "used"]
             region = region._replace(stations=used[["longitude", "latitude", "pga"]].dropna())
         draw_overview(results.shown, region, overview, results.language)
+    # Equal circles explain nothing
     pair = differing_pair(results.worst)
     if results.record is not None and pair is not None:
         with report.tried(walk):

@@ -56,6 +56,7 @@ from per_obspy.spectra.storage import write_spectra
 def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Report:
     """Write histories and sensitivity of the worst pairs of a run; none without a risk table."""
     settings, folder, report = context.settings, context.folder, Report([], [])
+    # A fault leaves the page without them
     if files := table_files(folder):
         with report.tried(folder / WORST_PAIRS):
             # The leading columns are those of the package
@@ -322,8 +323,7 @@ def report_ensemble(
     limits, language = ScreeningSettings(), settings.report.language
     texts, classes, stations = LANGUAGES[language], list(limits.classes), runs.stations()
     region = _region(settings.name, classes, simulated, stations)
-    with report.tried(folder / WORST_PAIRS), ranked_table([table]) as ranked:
-        write_drawings(Drawings(histories=runs.histories(ranked)), folder / WORST_PAIRS)
+    _store_histories(runs, table, folder / WORST_PAIRS, report)
     results = Results(
         "ensemble", region, coverage, language, Revision(), _scenario_sentences(settings),
         stations=stations, drawings=read_drawings(folder / WORST_PAIRS),
@@ -335,6 +335,12 @@ def report_ensemble(
     pairs = _pair_table(settings, pieces, coverage.screened, runs.totals(), runs.outlines())
     write_report(results, pairs, folder, report)
     return report
+
+
+def _store_histories(runs: ScenarioRuns, table: Path, path: Path, report: Report) -> None:
+    """Write the histories of the worst pairs of an ensemble."""
+    with report.tried(path), ranked_table([table]) as ranked:
+        write_drawings(Drawings(histories=runs.histories(ranked)), path)
 
 
 def _scenario_sentences(settings: Ensemble) -> list[str]:

@@ -117,6 +117,7 @@ class ScenarioRuns:
     def stations(self) -> pd.DataFrame:
         """Return the stations of all runs, each with the name of its scenario."""
         tables = list[pd.DataFrame]()
+        # A run that only a map serves has none
         for name, run in self.runs.items():
             if len(table := read_stations(run.folder / "stations.csv")):
                 # A run has its radii with its worst pairs

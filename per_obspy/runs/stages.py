@@ -141,6 +141,11 @@ def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
     return [station for station in stations if station.shard is not None]
 
 
+def _spectra(stations: Sequence[FinishedStation]) -> list[Any]:
+    """Return the spectra of stations that have any."""
+    return [station.spectra for station in stations if station.spectra is not None]
+
+
 def _done_stations(
     context: RunContext, record: RunRecord, tasks: Sequence[StationTask]
 ) -> list[FinishedStation]:
@@ -168,20 +173,18 @@ def _later_stages(
     # The risk table and the rows of buildings
     with timed(record.seconds, "screening"), record.with_engine(folder, executor):
         found = screened(context, usable, rejected)
-        spectra = [station.spectra for station in usable if station.spectra is not None]
+        spectra = _spectra(usable)
         table = write_stations(spectra, found.left_out, found.served.pairs, folder, found.alone)
         worst = explained(context, usable)
     # Everything that is read from them
     with timed(record.seconds, "report"):
-        report = reported(context, usable, found.coverage)
+        report = worst.joined(reported(context, usable, found.coverage))
     record = _with_counts(record, settings, found, stations, known)
-    faults = [*worst.faults, *report.faults]
-    files = [*found.outputs, *table.files, *worst.outputs, *report.outputs]
     return replace(
         record,
         # A picture or layer that failed is made by the next run
-        failed=record.failed or bool(faults),
-        faults=faults,
+        failed=record.failed or bool(report.faults),
+        faults=report.faults,
         alert=report.alert,
         engine=engine_facts(executor),
         simulated=simulated_motion(settings, usable),
@@ -189,7 +192,7 @@ def _later_stages(
         pair_tables=found.pair_tables.as_record(),
         coverage=found.coverage.as_record(),
         versions=software_versions(),
-        outputs=file_hashes(folder, files),
+        outputs=file_hashes(folder, [*found.outputs, *table.files, *report.outputs]),
     )
 
 

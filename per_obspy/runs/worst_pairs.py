@@ -261,6 +261,7 @@ def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
     )
     # Equal ones in the order of time
     speed = one - two
+    # Equal ones stay in their order
     order = np.argsort(-speed, kind="stable")
     fastest = order[counted[order]][:MOST_IMPACTS]
     rows: list[list[float]] = np.stack([time[fastest], speed[fastest]], axis=1).round(3).tolist()
