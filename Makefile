@@ -5,7 +5,7 @@ BIN := .venv/bin
 # Where a machine forbids compiled modules, every process would compile package and tests anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo figures test test-uncompiled test-long test-all workflows rehearsal check docs wheel benchmark extras constraints clean
+.PHONY: demo figures test test-long workflows rehearsal check docs wheel benchmark extras constraints clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -28,19 +28,12 @@ PYTEST := $(BIN)/python -m pytest -q -n auto --dist worksteal --ignore tests/wor
 test: .venv/test
 	@echo "== tests and doctests; make test-long and make workflows have the rest"
 	$(PYTEST) -m "not long"
-	$(MAKE) --no-print-directory test-uncompiled
-
-test-uncompiled: .venv/test
 	@echo "== the kernels' tests once more without the compiler, where an index out of bounds is an error"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -m "not compiled" tests/kernels
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "not compiled" tests/kernels
 
 test-long: .venv/test
 	@echo "== damaged copies of every format, killed runs and watchers, whole earthquakes, the blocks of README and docs"
 	$(PYTEST) -m long tests
-
-test-all: .venv/test
-	@echo "== the tests of test and test-long, which take less time together"
-	$(PYTEST)
 
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"

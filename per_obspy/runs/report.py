@@ -266,9 +266,8 @@ def report_design(
     report = Report([], [])
     if table.empty:
         return report
-    if settings.totals.area and settings.totals.area not in table:
-        reason = f"area: the pair table has no column {settings.totals.area!r}"
-        raise CatalogError("totals", reason)
+    if (area := settings.totals.area) and area not in table:
+        raise CatalogError("totals", f"area: the pair table has no column {area!r}")
     # The spectrum replaces the earthquake
     classes, language = list(settings.screening.classes), settings.report.language
     texts, spectrum = LANGUAGES[language], name_text(settings.spectrum.name)
@@ -276,16 +275,26 @@ def report_design(
     results = Results(
         "design", region, coverage, language, Revision(), [texts["spectrum"].format(name=spectrum)],
         own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
-        provenance=[_made_with(texts), _content_note([texts["page_design"]], texts)],
+        provenance=_made_of(texts, "page_design"),
     )  # fmt: skip
     pieces, outlines = iter([_with_flags(table)]), outlines_beside(settings.pairs)
     pairs = _pair_table(settings, pieces, len(table), settings.totals, outlines)
     write_report(results, pairs, folder, report)
     if "gap_for_target" in table:
-        figure = folder / "figures" / "gap_for_target.png"
-        with report.tried(figure):
-            draw_gaps_for_target(table, settings.target_rate, figure)
+        _draw_gaps(settings, table, folder, report)
     return report
+
+
+def _draw_gaps(settings: Design, table: pd.DataFrame, folder: Path, report: Report) -> None:
+    """Draw the gaps for the target rate of a hazard."""
+    figure = folder / "figures" / "gap_for_target.png"
+    with report.tried(figure):
+        draw_gaps_for_target(table, settings.target_rate, figure)
+
+
+def _made_of(texts: Mapping[str, str], content: str) -> list[tuple[str, str]]:
+    """Return with what a page was made, and the text on its content."""
+    return [_made_with(texts), _content_note([texts[content]], texts)]
 
 
 def _with_flags(table: pd.DataFrame) -> pd.DataFrame:
@@ -328,7 +337,7 @@ def report_ensemble(
         "ensemble", region, coverage, language, Revision(), _scenario_sentences(settings),
         stations=stations, drawings=read_drawings(folder / WORST_PAIRS),
         own=list(ensemble_columns(settings.weights, settings.yearly)), class_limits=limits.classes,
-        provenance=[_made_with(texts), _content_note([texts["page_ensemble"]], texts)],
+        provenance=_made_of(texts, "page_ensemble"),
     )  # fmt: skip
     # Buildings and outlines are those of the runs
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))

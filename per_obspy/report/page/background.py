@@ -193,7 +193,6 @@ def read_tiles(
     corners : tuple of float
         West, south, east and north in the projection of tiles, m.
     """
-    import pyarrow as pa
     import pyogrio  # in the process of readers only
 
     from per_obspy.inventory.footprints.gdal_paths import literal_path
@@ -207,17 +206,26 @@ def read_tiles(
             # Layers have one description
             facts: dict[str, Any] = pyogrio.read_info(plain, layer=chosen[0])["dataset_metadata"]
             level = _level(facts, corners)
-            # The stream of Arrow would not report the errors of tiles
-            options = {"ZOOM_LEVEL": str(level), "CLIP": "YES", "bbox": corners, "columns": []}
-            wkb = [pyogrio.raw.read(plain, layer=name, **options)[2] for name in chosen]
+            shapes = _shapes_at(level, plain, chosen, corners)
     except CatalogError:
         raise
     except (RuntimeError, ValueError, TypeError, KeyError, sqlite3.Error) as error:
         problem = f"cannot be read as {kind}: {reason_of(error)}"
         raise CatalogError(str(path), shortened(problem)) from error
-    # As bytes, which are sent to the other process
-    shapes = pa.array(np.concatenate(wkb), pa.large_binary())
     return shapes, EQUATOR / 2.0**level, str(facts.get("attribution", ""))
+
+
+def _shapes_at(
+    level: int, path: str, layers: Sequence[str], corners: Sequence[float]
+) -> "pa.Array":
+    """Return the shapes of a zoom level as WKB, bytes that can be sent to another process."""
+    import pyarrow as pa
+    import pyogrio
+
+    # The stream of Arrow would not report the errors of tiles
+    options = {"ZOOM_LEVEL": str(level), "CLIP": "YES", "bbox": corners, "columns": []}
+    wkb = [pyogrio.raw.read(path, layer=name, **options)[2] for name in layers]
+    return pa.array(np.concatenate(wkb), pa.large_binary())
 
 
 def _chosen_layers(path: Path, layers: Sequence[str], names: Sequence[str]) -> Sequence[str]:
