@@ -216,7 +216,7 @@ def read_tiles(
 
 
 def _shapes_at(
-    level: int, path: str, layers: Sequence[str], corners: Sequence[float]
+    level: int, path: Path, layers: Sequence[str], corners: Sequence[float]
 ) -> "pa.Array":
     """Return the shapes of a zoom level as WKB, bytes that can be sent to another process."""
     import pyarrow as pa
