@@ -1,7 +1,7 @@
 """
 Every default of a run, with its unit and where it comes from; read from TOML.
 
-Only the pipeline and the commands see a configuration as a whole. Rooms below take plain arguments
+Only runs and commands see a configuration as a whole. Rooms below take plain arguments
 or one section. Paths in a configuration are relative to the folder of its file.
 """
 

@@ -33,7 +33,7 @@ def notified_run(
     executor: Any = None,
 ) -> Result:
     """
-    Do a whole run with notification; parameters and errors are those of ``pipeline.run.run``.
+    Do a whole run with notification; parameters and errors are those of ``runs.run.run``.
 
     A message that cannot be delivered changes neither result nor exit code.
     """
