@@ -229,7 +229,7 @@ def _print_footprint_pairs(
     table: "pd.DataFrame", search: "Search", output: Path, as_json: bool
 ) -> None:
     """Print the account of a search, for machines or with the most common reasons."""
-    from per_obspy.report.statements import search_sentence
+    from per_obspy.report.coverage import search_sentence
 
     # Counts
     rejected, buildings = table.attrs["rejected"], output.with_suffix(".buildings.parquet")

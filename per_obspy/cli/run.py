@@ -339,7 +339,7 @@ def _print_counts(record: dict[str, Any]) -> None:
 
 def print_coverage(record: "Mapping[str, Any]") -> None:
     """Print the rows that have a verdict, those left out with their reasons, and the alert."""
-    from per_obspy.report.statements import coverage_sentences
+    from per_obspy.report.coverage import coverage_sentences
     from per_obspy.results.coverage import Coverage
 
     for sentence in coverage_sentences(Coverage.of_record(record)):

@@ -94,7 +94,7 @@ def test_json_is_for_machines(screened):
     # table, meanings, totals, summary and page with the overview; rejections last
     assert [Path(file).name for file in said["files"]] == [
         *("design.csv", "design.parquet", "design.columns.csv", "totals.csv"),
-        *("summary.txt", "summary.pdf", "design.kml", "report.html", "overview.png"),
+        *("summary.txt", "summary.pdf", "report.html", "design.kml", "overview.png"),
         "rejected.csv",
     ]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from per_obspy.report.statements import coverage_sentences, kind_text
+from per_obspy.report.coverage import coverage_sentences, kind_text
 from per_obspy.results.coverage import Coverage, Search
 
 SEARCH = Search(449, {"no height, storeys or period": 1469}, {"no outline": 3})

@@ -74,7 +74,8 @@ def read(folder):
     settings, out = load(folder / "run.toml", Run), folder / "out"
     results = Results("risk", run_region(settings, True, None), Coverage(60, 60))
     with ranked_table.ranked_table([out / "risk.parquet"]) as table:
-        pairs = PairTable(table.pieces(), table.pairs, settings.totals, None, False, False)
+        given = settings.totals, None, settings.report, False, False
+        pairs = PairTable(table.pieces(), table.pairs, *given)
         reader = TableReader(results.region.classes, pairs.totals, pairs.pairs, is_whole=False)
         return read_table(results, reader, pairs, out, Report([], [])), reader
 

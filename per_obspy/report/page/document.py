@@ -14,6 +14,7 @@ import pandas as pd
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.page.packing import (
     FRACTION_BITS,
     LONGEST_TEXT,
@@ -28,7 +29,6 @@ from per_obspy.report.results import Results
 from per_obspy.report.statements import (
     alert,
     class_text,
-    coverage_sentences,
     first_steps,
     key_numbers,
     revision_line,

@@ -11,6 +11,7 @@ from matplotlib.text import Text
 
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.overview import draw_map
 from per_obspy.report.results import Results
 from per_obspy.report.statements import (
@@ -18,7 +19,6 @@ from per_obspy.report.statements import (
     Alert,
     alert,
     class_text,
-    coverage_sentences,
     first_steps,
     made_sentence,
     revision_line,

@@ -6,13 +6,13 @@ from textwrap import wrap
 from unicodedata import normalize
 
 from per_obspy.files import written_whole
+from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.results import Results
 from per_obspy.report.statements import (
     LISTED,
     alert,
     alert_line,
     building_sentence,
-    coverage_sentences,
     first_steps,
     key_numbers,
     made_sentence,
