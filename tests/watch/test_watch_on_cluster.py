@@ -11,9 +11,7 @@ from per_obspy.errors import TryLater
 
 from ..runs.small_run import InProcess, plain_figures
 
-pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
-
-from per_obspy.runs.tasks import executor as dask_executor
+distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
 pytestmark = pytest.mark.long
 
@@ -28,11 +26,11 @@ def test_a_scheduler_that_ends_during_a_task_is_retried_at_the_next_pass(
     server, tmp_path, monkeypatch
 ):
     started = []
-    start = dask_executor._local_cluster
+    start = distributed.LocalCluster
     monkeypatch.setattr(
-        dask_executor,
-        "_local_cluster",
-        lambda address: started.append(start(address)) or started[-1],
+        distributed,
+        "LocalCluster",
+        lambda **options: started.append(start(**options)) or started[-1],
     )
 
     def ending(stage, done, _):
