@@ -430,18 +430,22 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 
 def _print_worst(folder: Path, count: int) -> None:
     """Print the worst pairs as a table."""
-    # Probabilities in percent, as people say them
     titles = list(SHOWN.values())
-    at = list(SHOWN).index("probability")
-    worst = [
-        (*row[:at], percent(row[at]), *row[at + 1 :])
-        for row in _worst_rows(folder, list(SHOWN), count)
-    ]
+    worst = [tuple(map(_said, SHOWN, row)) for row in _worst_rows(folder, list(SHOWN), count)]
     print_table(f"The {len(worst)} worst pairs", titles, worst)
     print(
         "Ranked by impact, doubled where floors meet columns, half as much again where a tall "
         "building stands beside a low one."
     )
+
+
+def _said(name: str, value: object) -> object:
+    """Return a cell as people say it: a chance in percent, an impact with its two sure digits."""
+    if name == "probability":
+        return percent(value)
+    # The contact law allows no more
+    is_known = isinstance(value, float) and value == value
+    return f"{value:.2g}" if name.startswith("expected_") and is_known else value
 
 
 def _worst_rows(folder: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:

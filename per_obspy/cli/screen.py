@@ -270,11 +270,12 @@ def _print_ensemble(result: "Result") -> None:
 def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") -> None:
     """Print some columns of the worst pairs as a table."""
     from per_obspy.report.layers.qgis import column_aliases
+    from per_obspy.results.table_files import rounded_table
     from per_obspy.screening.columns import known_column
 
-    # Probabilities in percent, all else in the unit of its column
+    # Impacts with two digits, probabilities in percent, all else in the unit of its column
     chances = [name for name in columns if name.endswith("probability")]
-    shown = worst[list(columns)].astype(dict.fromkeys(chances, object))
+    shown = rounded_table(worst[list(columns)]).astype(dict.fromkeys(chances, object))
     for name in chances:
         shown[name] = worst[name].map(percent)
     units = {name: column.unit for name in columns if (column := known_column(name))}

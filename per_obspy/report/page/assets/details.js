@@ -45,17 +45,17 @@ class Details {
     if (known("probability")) said.push(t("says_probability", { value: this.page.percent(this.value("probability", i)) }));
     if (known("expected_impact_velocity") && this.value("expected_impact_velocity", i) > 0) {
       said.push(t(known("impact_velocity_84") ? "says_velocity" : "says_velocity_alone", {
-        value: this.page.number(this.value("expected_impact_velocity", i), 2),
-        high: this.page.number(this.value("impact_velocity_84", i), 2),
+        value: number(this.value("expected_impact_velocity", i)),
+        high: number(this.value("impact_velocity_84", i)),
       }));
     }
     const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
     said.push(gap);
     if (known("demand")) said.push(t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
     if (this.value("impacts", i) > 0) {
-      said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(this.value("impact_velocity_exact", i), 2) }));
+      said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(this.value("impact_velocity_exact", i)) }));
     }
-    if (known("expected_amplification")) said.push(t("says_amplification", { value: number(this.value("expected_amplification", i), 2) }));
+    if (known("expected_amplification")) said.push(t("says_amplification", { value: number(this.value("expected_amplification", i)) }));
     const station = this.value("station", i);
     const address = this.value("address", i);
     if (address && typeof address === "string") said.push(t("says_address", { value: address }));
@@ -67,7 +67,7 @@ class Details {
     const { t, number } = this.page;
     const facts = [
       ["building_id", null], ["height", 1, 1], ["storeys", 1, 0], ["period", 1, 2], ["damping", 100, 1],
-      ["participation", 1, 2], ["per", 100, 1], ["sd", 100, 1], ["amplification_exact", 1, 2],
+      ["participation", 1, 2], ["per", 100, 1], ["sd", 100, 1], ["amplification_exact", 1],
     ];
     const table = element("table", { class: "facts" }, element("caption", {}, t("both_buildings")));
     const heads = [t("building"), "1", "2"].map((text, at) => element("th", { scope: "col", class: at ? "number" : "name" }, text));

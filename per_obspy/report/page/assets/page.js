@@ -16,11 +16,13 @@ class Page {
       const text = single || (content.texts[key] === undefined ? key : content.texts[key]);
       return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
     };
+    // With so many decimals; without a number of them two digits, of what the contact law leaves uncertain
     this.number = (value, digits) => {
       if (!Number.isFinite(value)) return "–";
       // No minus before a zero
       const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
-      return shown.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "always" });
+      const form = digits === undefined ? { minimumSignificantDigits: 2, maximumSignificantDigits: 2 } : { minimumFractionDigits: digits, maximumFractionDigits: digits };
+      return shown.toLocaleString(content.language, { ...form, useGrouping: "always" });
     };
     this.setGrades();
     this.setBuildings();
@@ -89,7 +91,7 @@ class Page {
       rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
       hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.percent(column.probability_common[i]),
     })];
-    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(column.impact_velocity[i], 2) }));
+    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(column.impact_velocity[i]) }));
     const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
     if (prevention) said.push(this.t("building_prevention", { value: prevention }));
     return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
@@ -99,7 +101,7 @@ class Page {
 
   shortText(pair) {
     const { column } = this.pairs;
-    return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(column.expected_impact_velocity[pair], 2)} m/s`;
+    return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(column.expected_impact_velocity[pair])} m/s`;
   }
 
   flagName(name) { return (this.content.flag_names || {})[name] || name.replaceAll("_", " "); }
