@@ -250,7 +250,8 @@ def _print_footprint_pairs(
         counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
         of_search = {"neighbours": search.neighbours, "left_out": dict(search.left_out)}
         places = {"output": str(output), "buildings": str(buildings)}
-        print(json.dumps({**places, **counts, **of_search, **of_raster}))
+        of_licence = {"restricted": search.restricted} if search.restricted else {}
+        print(json.dumps({**places, **counts, **of_search, **of_raster, **of_licence}))
         return
     print(printable(search_sentence(search, "en")))
     counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"

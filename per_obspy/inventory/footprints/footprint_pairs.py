@@ -31,7 +31,7 @@ from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, read_
 from per_obspy.inventory.footprints.neighbours import IntArray, Outlines, neighbours
 from per_obspy.inventory.footprints.raster_heights import raster_heights
 from per_obspy.inventory.footprints.raw_layer import Geometries
-from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE
+from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE, source_of
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
 
@@ -93,6 +93,12 @@ class FootprintPairs(NamedTuple):
     pairs: pd.DataFrame
     buildings: Buildings
     left_out: FloatArray
+
+    @property
+    def restricted(self) -> list[str]:
+        """Name and licence of the source of the buildings, if it forbids commercial use."""
+        source = source_of(map(str, self.buildings.table.columns))
+        return [f"{source.name} ({source.licence})"] if source.licence else []
 
 
 def pairs_from_footprints(
