@@ -143,12 +143,13 @@ CATALOG = Path("catalogs/catalog.toml")
 @pairs.command("find")
 def find_pairs(
     footprints: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile; or a list of buildings, "
-            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth."
+            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth; not "
+            "given, with --bbox: of the latest release of Overture Maps."
         ),
-    ],
+    ] = None,
     output: Annotated[Path, output_option("Pair table, .parquet or .csv.")] = Path("pairs.parquet"),
     distance: Annotated[
         float, typer.Option(min=0.001, max=10.0, help="Largest gap of a pair, m.")
@@ -202,10 +203,25 @@ def find_pairs(
     columns = {name: known for name, known in given.items() if known is not None}
     columns |= _named_columns(column or [])
     box = None if bbox is None else parsed_box(bbox)
+    if footprints is None:
+        footprints = _fetched(box, output)
     found = find_footprint_pairs(footprints, distance, layer, gap_std, columns, box, heights)
     search = write_search(found, output)
     _print_footprint_pairs(found, search, output, as_json)
     stop_if_nothing(len(found.pairs))
+
+
+def _fetched(box: "Box | None", output: Path) -> Path:
+    """Return the buildings of a box as Overture Maps has them."""
+    if box is None:
+        raise typer.BadParameter("give a layer, or --bbox", param_hint="FOOTPRINTS")
+    require_extra("overture", "overturemaps")
+    from per_obspy.inventory.footprints.overture import fetch_overture
+
+    path = fetch_overture(box, output)
+    # The release is in the name
+    print(f"buildings of Overture Maps: {path}", file=sys.stderr)
+    return path
 
 
 def parsed_box(text: str) -> "Box":
