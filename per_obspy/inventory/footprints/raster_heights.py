@@ -102,7 +102,10 @@ def _read(file: Path, outlines: pa.Array) -> tuple[FloatArray, bool]:
             heights = np.array([_median(raster, shape) for shape in shapes])
             edge = shapely.box(0, 0, raster.width, raster.height)
             return heights, bool(shapely.intersects(shapes, edge).any())
-    except rasterio.errors.RasterioError as error:
+    except CatalogError:
+        raise
+    # Texts of a damaged file are no UTF-8, its numbers no place
+    except (rasterio.errors.RasterioError, ValueError, OverflowError) as error:
         raise CatalogError(str(file), unreadable_reason(file, "GeoTIFF", error)) from error
 
 
@@ -111,7 +114,7 @@ def _problem(raster: Any) -> str:
     unit = (raster.units[0] or "").strip().lower()
     if raster.count != 1:
         return f"the raster has {raster.count} bands, expected one of heights"
-    if np.dtype(raster.dtypes[0]).kind not in "iuf":
+    if not raster.dtypes[0].startswith(("int", "uint", "float")):
         return f"the raster holds {raster.dtypes[0]}, expected real numbers"
     # Feet would be taken for metres
     if unit not in _METRES:

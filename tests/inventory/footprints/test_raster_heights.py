@@ -130,10 +130,12 @@ def test_files_that_are_no_raster(write, tmp_path):
     (tmp_path / "a.tif").write_text("<VRTDataset/>")
     with pytest.raises(CatalogError, match="no GeoTIFF by its first bytes"):
         raster_heights(tmp_path / "a.tif", outlines)
-    whole = write(np.random.default_rng(1).random((60, 50)), compress="deflate").read_bytes()
-    (tmp_path / "a.tif").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(CatalogError, match="GeoTIFF"):
-        raster_heights(tmp_path / "a.tif", outlines)
+    whole = write(np.random.default_rng(1).random((60, 50)), unit="metre").read_bytes()
+    # cut, and with a text that is no UTF-8
+    for damaged in (whole[: len(whole) // 2], whole.replace(b"metre", b"m\x96tre")):
+        (tmp_path / "a.tif").write_bytes(damaged)
+        with pytest.raises(CatalogError, match="not a GeoTIFF"):
+            raster_heights(tmp_path / "a.tif", outlines)
 
 
 def test_only_buildings_without_a_size_take_the_raster():
