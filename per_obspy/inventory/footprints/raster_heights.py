@@ -121,6 +121,9 @@ def _problem(raster: Any) -> str:
         return f"heights of the raster are in {unit!r:.20}, expected m"
     if raster.crs is None or raster.transform.is_identity or raster.transform.is_degenerate:
         return "the raster has no coordinate reference system, or no place in it"
+    # Where places are in feet, heights often are
+    if not unit and raster.crs.is_projected and raster.crs.linear_units_factor[1] != 1.0:
+        return f"heights of the raster name no unit, and its system is in {raster.crs.linear_units}"
     return ""
 
 

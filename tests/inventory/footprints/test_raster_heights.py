@@ -109,6 +109,7 @@ def test_half_of_an_outline_must_have_heights(write):
 WRONG = {
     "3 bands": ({"heights": np.full((9, 9, 3), 8.0)}, "has 3 bands, expected one"),
     "feet": ({"heights": np.full((9, 9), 8.0), "unit": "ft"}, "in 'ft', expected m"),
+    "feet perhaps": ({"heights": np.full((9, 9), 8.0), "crs": "EPSG:2263"}, "name no unit.* foot"),
     "no system": ({"heights": np.full((9, 9), 8.0), "crs": None}, "no coordinate reference"),
     "complex": ({"heights": np.full((9, 9), 8j)}, "holds complex128"),
     "elsewhere": ({"heights": np.full((9, 9), 8.0), "crs": "EPSG:32720"}, "none of the buildings"),
