@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
     from per_obspy.inventory.files.formats import PairFile
+    from per_obspy.inventory.footprints.footprint_pairs import FootprintPairs
     from per_obspy.inventory.footprints.layer_files import Box
     from per_obspy.results.coverage import Search
 
@@ -142,12 +143,13 @@ CATALOG = Path("catalogs/catalog.toml")
 @pairs.command("find")
 def find_pairs(
     footprints: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile; or a list of buildings, "
-            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth."
+            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth; not "
+            "given, with --bbox: of the latest release of Overture Maps."
         ),
-    ],
+    ] = None,
     output: Annotated[Path, output_option("Pair table, .parquet or .csv.")] = Path("pairs.parquet"),
     distance: Annotated[
         float, typer.Option(min=0.001, max=10.0, help="Largest gap of a pair, m.")
@@ -176,6 +178,13 @@ def find_pairs(
             "column bbox, as Overture's; only the parts of the file that hold it are read."
         ),
     ] = None,
+    heights: Annotated[
+        Path | None,
+        typer.Option(
+            help="GeoTIFF of heights above ground, m: of buildings without height, storeys and "
+            "period, the median inside the outline."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -184,6 +193,8 @@ def find_pairs(
     Example: per-obspy pairs town.gpkg -o pairs.parquet
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
+    if heights is not None:
+        require_extra("raster", "rasterio")
     from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
     from per_obspy.runs.inputs.drawn_pairs import write_search
 
@@ -192,10 +203,25 @@ def find_pairs(
     columns = {name: known for name, known in given.items() if known is not None}
     columns |= _named_columns(column or [])
     box = None if bbox is None else parsed_box(bbox)
-    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns, box)
+    if footprints is None:
+        footprints = _fetched(box, output)
+    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns, box, heights)
     search = write_search(found, output)
-    _print_footprint_pairs(found.pairs, search, output, as_json)
+    _print_footprint_pairs(found, search, output, as_json)
     stop_if_nothing(len(found.pairs))
+
+
+def _fetched(box: "Box | None", output: Path) -> Path:
+    """Return the buildings of a box as Overture Maps has them."""
+    if box is None:
+        raise typer.BadParameter("give a layer, or --bbox", param_hint="FOOTPRINTS")
+    require_extra("overture", "overturemaps")
+    from per_obspy.inventory.footprints.overture import fetch_overture
+
+    path = fetch_overture(box, output)
+    # The release is in the name
+    print(f"buildings of Overture Maps: {path}", file=sys.stderr)
+    return path
 
 
 def parsed_box(text: str) -> "Box":
@@ -226,28 +252,41 @@ def _named_columns(options: "Sequence[str]") -> dict[str, str]:
 
 
 def _print_footprint_pairs(
-    table: "pd.DataFrame", search: "Search", output: Path, as_json: bool
+    found: "FootprintPairs", search: "Search", output: Path, as_json: bool
 ) -> None:
     """Print the account of a search, for machines or with the most common reasons."""
+    from per_obspy.inventory.footprints.building_columns import raster_counts
     from per_obspy.report.coverage import search_sentence
 
     # Counts
+    table, of_raster = found.pairs, raster_counts(found.buildings.table)
     rejected, buildings = table.attrs["rejected"], output.with_suffix(".buildings.parquet")
     touching = int((table["gap"] == 0.0).sum())
     if as_json:
         counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
         of_search = {"neighbours": search.neighbours, "left_out": dict(search.left_out)}
         places = {"output": str(output), "buildings": str(buildings)}
-        print(json.dumps({**places, **counts, **of_search}))
+        of_licence = {"restricted": search.restricted} if search.restricted else {}
+        print(json.dumps({**places, **counts, **of_search, **of_raster, **of_licence}))
         return
     print(printable(search_sentence(search, "en")))
     counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
     print(f"{counted}: {output}")
-    # Further files, assumptions, and reasons of rejected rows
+    # Further files and assumptions
     print(f"  outlines and columns of all buildings: {buildings}")
+    _print_assumptions(table, of_raster)
+
+
+def _print_assumptions(table: "pd.DataFrame", counts: "Mapping[str, int | float]") -> None:
+    """Print the assumed deviation of gaps, and how many heights are from a raster."""
     if "given" not in set(table["gap_std_source"]):
         largest = table["gap_std"].max()
         print(f"  deviation of gaps, assumed by the origin of the outlines: up to {largest:g} m")
+    # Without a raster there are no counts
+    if counts:
+        filled, largest = counts["heights_from_raster"], counts["largest_height_log_std"]
+        said = f"{filled} buildings, log-deviation up to {largest:.2g}" if filled else "no building"
+        print(f"  height from the raster: {said}; {counts['without_size']} without a size")
 
 
 @pairs.command("check")

@@ -58,6 +58,8 @@ def search_sentence(search: Search, language: str) -> str:
     if search.buildings:
         kinds = kind_text(search.buildings, language)
         text += f"; {texts['coverage_buildings'].format(kinds=kinds)}"
+    if search.restricted:
+        text += f"; {texts['coverage_licence'].format(sources=', '.join(search.restricted))}"
     return f"{text}."
 
 

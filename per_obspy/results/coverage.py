@@ -105,6 +105,8 @@ class Search:
     buildings: Mapping[str, int] = field(default_factory=dict)
     #: Areas with most neighbours left out.
     areas: Sequence[tuple[str, int]] = ()
+    #: Sources of the outlines whose licence forbids commercial use, with the licence.
+    restricted: Sequence[str] = ()
 
     @property
     def neighbours(self) -> int:
@@ -118,6 +120,7 @@ class Search:
             most_first(Counter(self.left_out) + Counter(other.left_out)),
             most_first(Counter(self.buildings) + Counter(other.buildings)),
             [*self.areas, *other.areas][:MOST_AREAS],
+            sorted({*self.restricted, *other.restricted}),
         )
 
 
@@ -209,7 +212,12 @@ def worst_areas(areas: Mapping[str, int]) -> list[tuple[str, int]]:
     return [(name, count) for name, count in Counter(areas).most_common() if name][:MOST_AREAS]
 
 
-def search_account(pairs: int, rejected: Iterable[Rejection], areas: Iterable[str] = ()) -> Search:
+def search_account(
+    pairs: int,
+    rejected: Iterable[Rejection],
+    areas: Iterable[str] = (),
+    restricted: Sequence[str] = (),
+) -> Search:
     """
     Return the account of a search.
 
@@ -221,12 +229,14 @@ def search_account(pairs: int, rejected: Iterable[Rejection], areas: Iterable[st
         Of neighbours (``pair``) and of features of the layer (``building``).
     areas : iterable of str
         Area of each neighbour that is left out.
+    restricted : sequence of str, optional
+        Sources of the outlines whose licence forbids commercial use, with the licence.
     """
     kinds = {"pair": CoverageTally(), "building": CoverageTally()}
     for rejection in rejected:
         kinds[rejection.kind].add([rejection])
     pair, building = (most_first(tally.kinds) for tally in kinds.values())
-    return Search(pairs, pair, building, worst_areas(Counter(areas)))
+    return Search(pairs, pair, building, worst_areas(Counter(areas)), restricted)
 
 
 def as_metadata(search: Search) -> dict[bytes, bytes]:

@@ -43,6 +43,15 @@ def outlines_are_learned(pairs: Table) -> BoolArray:
     return np.asarray(np.asarray(pairs["gap_std_source"], dtype=object) == "learned")
 
 
+def heights_are_from_raster(pairs: Table) -> BoolArray:
+    """Return a mask of pairs with a height from a raster."""
+    mask = np.zeros(len(pairs["gap"]), dtype=bool)
+    for name in ("height_source_1", "height_source_2"):
+        if name in pairs:
+            mask |= np.asarray(pairs[name], dtype=object) == "raster"
+    return mask
+
+
 def elastic_ratios(table: Table) -> dict[str, FloatArray]:
     """
     Return the elastic displacement of both buildings over their yield displacement by HAZUS.
@@ -67,19 +76,16 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
     gap = values(table, "gap")
     # Tables that are computed for a screening have a gap in every row, and a mark
     unknown = table["unknown_gap"] if "unknown_gap" in table else np.isnan(gap)
-    # A table without a doubtful cell has no notes, or none in some of its parts
-    notes = table["cell_notes"] if "cell_notes" in table else gap  # noqa: SIM401, as no mapping
-    has_note = np.array(
-        [isinstance(note, str) and note != "" for note in np.asarray(notes).tolist()], bool
-    )
+    # Suspicions of the pair table
     odd = _named_in(table[ODD]) if ODD in table else {}
     is_derived = period_is_derived(table)
     return {
         **odd,
         "unknown_gap": np.asarray(unknown, dtype=bool),
-        "doubtful_cell": has_note,
+        "doubtful_cell": _are_doubtful(table),
         "touching": gap == 0.0,
         "learned_outlines": outlines_are_learned(table),
+        "raster_height": heights_are_from_raster(table),
         "beyond_elastic": np.fmax(*both(table, "elastic_ratio")) > 1.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
@@ -89,6 +95,14 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "soft_ground": np.asarray(table["soft_ground"], dtype=bool),
         "floor_to_column": np.asarray(table["floors_misaligned"], dtype=bool),
     }
+
+
+def _are_doubtful(table: Table) -> BoolArray:
+    # A table without a doubtful cell has no notes, or none in some of its parts
+    notes = table["cell_notes" if "cell_notes" in table else "gap"]
+    return np.array(
+        [isinstance(note, str) and note != "" for note in np.asarray(notes).tolist()], bool
+    )
 
 
 def _are_equal(table: Table) -> BoolArray:

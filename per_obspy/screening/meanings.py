@@ -49,6 +49,9 @@ FLAGS: dict[str, str] = {
         "an outline was learned from images, which show no gap to be wide enough: the state is not "
         "no"
     ),
+    "raster_height": (
+        "a height is the median of a raster inside the outline, with the deviation height_log_std"
+    ),
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"
     ),

@@ -99,11 +99,14 @@ def test_a_likelier_pair_never_has_a_less_likely_state(chances):
 def test_no_gap_between_learned_outlines_is_a_no(station):
     # would catch: a state by the probability alone, a flag without the state
     wide = {"gap": 3.0, "gap_std": 0.1}
-    rows = [wide, {**wide, "gap_std_source": "learned"}, {"gap": 0.0, "gap_std_source": "learned"}]
+    learned = {"gap_std_source": "learned", "height_source_2": "raster"}
+    rows = [wide, {**wide, **learned}, {**learned, "gap": 0.0, "height_source_2": ""}]
     table = per_obspy.risk_table(station, make_pairs(rows)).set_index("pair_id").sort_index()
     assert table["state"].tolist() == ["no", "unlikely", "yes"]
     flagged = table["flags"].str.split().map(lambda names: "learned_outlines" in names)
     assert flagged.tolist() == [False, True, True]
+    # the source of a height is a column that is only carried
+    assert table["flags"].str.contains("raster_height").tolist() == [False, True, False]
     # nothing else is changed
     assert table["probability"].iloc[0] == table["probability"].iloc[1]
 

@@ -9,6 +9,9 @@ layer, and its deviation, ``height_log_std``. A class needs ``ENOUGH`` known hei
 are none but storeys, the same is done with storeys. No value is taken from outside the layer. The
 known buildings are taken for a sample of the class, which they may not be: tall buildings are
 mapped first.
+
+A raster of heights, where the user has one, comes before the classes. Its deviation is that from
+the known heights of the layer, if there are ``ENOUGH``, else that of heights from coarse images.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, did_you_mean, printable
 from per_obspy.inventory.cells import NOTES, is_number, read_numbers
 from per_obspy.inventory.footprints.sources import (
@@ -56,17 +60,30 @@ PREFIX = "layer_"
 #: Longest name of a carried column, characters: that of a pair table has two more.
 LONGEST_NAME = 190
 
+#: Column of the buildings whose height is from a raster, and its word.
+HEIGHT_SOURCE, RASTER = "height_source", "raster"
+
+#: Largest ratio of a raster's heights to the known ones in the median, and its inverse: beyond it
+#: they are in feet, or above sea level.
+LARGEST_RATIO = 2.0
+
 #: Known values that a class needs. The median of twenty of log-deviation s is off by 1.25 s / 4.5.
 ENOUGH = 20
 
 
-def building_columns(attributes: pd.DataFrame, names: Mapping[str, str], file: str) -> pd.DataFrame:
+def building_columns(
+    attributes: pd.DataFrame,
+    names: Mapping[str, str],
+    file: str,
+    raster: FloatArray | None = None,
+) -> pd.DataFrame:
     """
     Return the attributes of a layer by the schema, without ``_1`` or ``_2``, then all others.
 
     The index is the number of the feature; ``cell_notes`` contains what was not understood. Names
     of the schema -> the layer's columns are given where those are not recognised, or not the right
-    ones.
+    ones. Heights of the buildings in a raster, m, NaN where it has none, are for those without any
+    size.
 
     Raises
     ------
@@ -87,12 +104,15 @@ def building_columns(attributes: pd.DataFrame, names: Mapping[str, str], file: s
     # An empty cell is no name of a system
     if "system" in given:
         given["system"] = given["system"].fillna("").astype(str)
-    table = schema_columns(attributes, file, given)
+    table = schema_columns(attributes, file, given, raster)
     return table.join(_others(attributes, table))
 
 
 def schema_columns(
-    attributes: pd.DataFrame, file: str, given: Mapping[str, pd.Series] | None = None
+    attributes: pd.DataFrame,
+    file: str,
+    given: Mapping[str, pd.Series] | None = None,
+    raster: FloatArray | None = None,
 ) -> pd.DataFrame:
     """
     Return the columns of a known source under the schema's names, then those to carry along.
@@ -103,21 +123,22 @@ def schema_columns(
     Raises
     ------
     CatalogError
-        If the layer has neither height nor storeys nor period.
+        If the layer has neither height nor storeys nor period, or a raster contradicts it.
     """
     source = source_of(map(str, attributes.columns))
     cells = converted(attributes, source)
     table = _named_columns(cells, source, given)
     notes, placeholders = _read_sizes(table)
     is_understood = np.array(notes, dtype=object) == ""
-    is_empty = len(table) and (_has_no_size(table) & is_understood).all()
-    if is_empty or not set(SIZES) & set(table):
-        raise CatalogError(file, _no_size(table, attributes, source))
+    if raster is not None:
+        table = with_raster_heights(table, raster, is_understood, file)
+    if problem := _without_any_size(table, is_understood, attributes, source):
+        raise CatalogError(file, problem)
     table = _with_origins(table, cells, source, given)
     # Missing heights from the classes of the layer
     if source.class_column is not None:
-        no_class = pd.Series("", cells.index)
-        table = with_class_heights(table, cells.get(source.class_column, no_class), is_understood)
+        classes = cells.get(source.class_column, pd.Series("", cells.index))
+        table = with_class_heights(table, classes, is_understood)
     # A placeholder of a building without any size is a note
     for row in np.flatnonzero(_has_no_size(table) & is_understood).tolist():
         notes[row] = placeholders.get(row, "")
@@ -195,12 +216,15 @@ def _systems(cells: pd.DataFrame, source: Source) -> pd.Series | None:
     return codes.str[1:].map(source.systems).fillna("")
 
 
-def _no_size(table: pd.DataFrame, attributes: pd.DataFrame, source: Source) -> str:
-    """Return the message for a layer without heights, with a similar column if there is one."""
+def _without_any_size(
+    table: pd.DataFrame, is_understood: NDArray[np.bool_], attributes: pd.DataFrame, source: Source
+) -> str:
+    """Return what a layer without any size lacks, with a similar column; empty if it has one."""
     mend = "" if source.name == "per_obspy" else f"; {source.name} gives none here, add one"
     # The column is empty, or is not there
     if set(SIZES) & set(table):
-        return f"height, storeys and period are empty in every feature{mend}"
+        is_empty = len(table) and (_has_no_size(table) & is_understood).all()
+        return f"height, storeys and period are empty in every feature{mend}" if is_empty else ""
     columns = list(map(str, attributes.columns))
     suggestion = did_you_mean("height", columns) or did_you_mean("storeys", columns)
     problem = "no column height, storeys or period in the layer"
@@ -249,6 +273,65 @@ def with_class_heights(
         result["height_log_std"] = given.mask(rows, deviation)
         missing &= ~rows
     return result
+
+
+def with_raster_heights(
+    table: pd.DataFrame,
+    raster: FloatArray,
+    is_understood: NDArray[np.bool_] | bool,
+    file: str,
+) -> pd.DataFrame:
+    """
+    Return a table of buildings with heights of a raster, m, where they have no size.
+
+    They are marked as derived by ``height_log_std``, and ``height_source`` is ``raster``.
+
+    Raises
+    ------
+    CatalogError
+        If the raster has another median than the known heights of the layer, by a factor of 2.
+    """
+    limits = COLUMNS["height_1"]
+    usable = (raster >= limits.low) & (raster <= limits.high)
+    height = table.get("height", pd.Series(np.nan, table.index))
+    # The raster beside the heights that the layer knows
+    known = usable & (height > 0.0).to_numpy()
+    errors = np.log(raster[known] / height.to_numpy(np.float64)[known])
+    deviation = _raster_deviation(raster, errors, file)
+    # Each missing height, marked by its deviation
+    rows = usable & (_has_no_size(table) & is_understood).to_numpy()
+    given = table.get("height_log_std", pd.Series(np.nan, table.index))
+    return table.assign(
+        height=height.mask(rows, raster),
+        height_log_std=given.mask(rows, deviation),
+        **{HEIGHT_SOURCE: np.where(rows, RASTER, "")},
+    )
+
+
+def _raster_deviation(raster: FloatArray, errors: FloatArray, file: str) -> FloatArray:
+    """Return log-deviations of a raster's heights, m, by its errors beside known ones if enough."""
+    if errors.size < ENOUGH:
+        deviation = np.sqrt(np.log1p((ORIGINS["coarse"].height_std / raster) ** 2))
+    else:
+        ratio = float(np.exp(np.median(errors)))
+        if not 1.0 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
+            problem = f"heights of the raster are {ratio:.3g} times the {errors.size} known ones"
+            raise CatalogError(file, f"{problem}, in the median: metres above ground expected")
+        # Bias included
+        deviation = np.full(raster.size, np.sqrt(np.mean(errors**2)))
+    return np.clip(deviation, 1e-3, COLUMNS["height_log_std_1"].high)
+
+
+def raster_counts(table: pd.DataFrame) -> dict[str, int | float]:
+    """Return what a raster gave to buildings: counts and the largest deviation; empty without."""
+    if HEIGHT_SOURCE not in table or "height_log_std" not in table:
+        return {}
+    rows = table[HEIGHT_SOURCE] == RASTER
+    return {
+        "heights_from_raster": int(rows.sum()),
+        "largest_height_log_std": float(table["height_log_std"][rows].max()) if rows.any() else 0.0,
+        "without_size": int(_has_no_size(table).sum()),
+    }
 
 
 def _others(attributes: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:

@@ -29,8 +29,9 @@ from per_obspy.inventory.footprints.building_columns import building_columns
 from per_obspy.inventory.footprints.layer_files import Box
 from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, read_layer, transformed
 from per_obspy.inventory.footprints.neighbours import IntArray, Outlines, neighbours
+from per_obspy.inventory.footprints.raster_heights import raster_heights
 from per_obspy.inventory.footprints.raw_layer import Geometries
-from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE
+from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE, source_of
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
 
@@ -93,6 +94,12 @@ class FootprintPairs(NamedTuple):
     buildings: Buildings
     left_out: FloatArray
 
+    @property
+    def restricted(self) -> list[str]:
+        """Name and licence of the source of the buildings, if it forbids commercial use."""
+        source = source_of(map(str, self.buildings.table.columns))
+        return [f"{source.name} ({source.licence})"] if source.licence else []
+
 
 def pairs_from_footprints(
     path: str | Path,
@@ -154,11 +161,13 @@ def find_footprint_pairs(
     gap_std: float | None = None,
     columns: Mapping[str, str] | None = None,
     box: Box | None = None,
+    raster: Path | None = None,
 ) -> FootprintPairs:
     """
     Find pairs as :func:`pairs_from_footprints` does, and keep the buildings.
 
-    With ``box`` (west, south, east, north, degrees) only buildings that touch it are read.
+    With ``box`` (west, south, east, north, degrees) only buildings that touch it are read. Missing
+    heights are taken from ``raster``, see :func:`.raster_heights.raster_heights`.
     """
     largest = checks.number("distance", distance, checks.positive)
     _require_within("distance", largest, "gap")
@@ -167,7 +176,7 @@ def find_footprint_pairs(
         _require_within("gap_std", gap_std, "gap_std")
     # Footprints, without those that repeat another
     source = str(path)
-    buildings, rejected = _usable_buildings(path, layer, columns or {}, box)
+    buildings, rejected = _usable_buildings(path, layer, columns or {}, box, raster)
     buildings, outlines = projected(buildings, source)
     pairs = neighbours(outlines, largest)
     if pairs.empty:
@@ -195,11 +204,16 @@ def _require_within(name: str, length: float, column: str) -> None:
 
 
 def _usable_buildings(
-    path: str | Path, layer: str | None, columns: Mapping[str, str], box: Box | None
+    path: str | Path,
+    layer: str | None,
+    columns: Mapping[str, str],
+    box: Box | None,
+    raster: Path | None,
 ) -> tuple[Buildings, tuple[Rejection, ...]]:
     """Return the buildings of a layer under the names of the schema, and features that are none."""
     outlines, attributes, lost = read_layer(path, layer, box)
-    table = building_columns(attributes, columns, str(path))
+    heights = None if raster is None else raster_heights(raster, outlines)
+    table = building_columns(attributes, columns, str(path), heights)
     buildings, repeated = without_repetitions(outlines, table, str(path))
     rejected, usable = (*lost, *repeated), len(buildings.outlines)
     if usable < 2:

@@ -68,6 +68,8 @@ class Source(NamedTuple):
     #: Word -> origin of outlines.
     origins: Mapping[str, str] = {}
     heights: str = ""
+    #: That forbids commercial use, if it does.
+    licence: str = ""
 
 
 @cache

@@ -99,7 +99,7 @@ def write_search(found: "FootprintPairs", path: Path) -> "Search":
     # What is left out belongs to the cells of a run's totals
     rejected, places = found.pairs.attrs["rejected"], found.left_out
     areas = list(named_cells(places[:, 0], places[:, 1], Totals().cell).cell) if len(places) else []
-    search = search_account(len(found.pairs), rejected, areas)
+    search = search_account(len(found.pairs), rejected, areas, found.restricted)
     write_pairs(found.pairs, path, as_metadata(search))
     write_buildings(found.buildings, path.with_suffix(".buildings.parquet"))
     write_rejected(rejected, path.with_suffix(".rejected.csv"))

@@ -12,6 +12,8 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.footprints.building_columns import schema_columns
 from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs, write_buildings
 from per_obspy.inventory.footprints.sources import ORIGINS, outline_origins, source_of
+from per_obspy.report.statements import search_sentence
+from per_obspy.results.coverage import search_of_table
 
 #: A square of 10 m at the equator, in degrees, and its way to the next one with a gap of 0.5 m.
 SIDE, STEP = 10.0 / 111_320.0, 10.5 / 111_320.0
@@ -88,6 +90,19 @@ def test_heights_of_an_atlas_are_coarse_whatever_the_outline():
     table = schema_columns(layer, "town")
     assert table["outline_source"].tolist() == ["traced", "coarse"]
     assert_allclose(np.sqrt(np.expm1(table["height_log_std"] ** 2)) * 8.0, 3.7, rtol=1e-12)
+
+
+def test_the_licence_of_an_atlas_is_said_by_the_command_and_kept_for_the_page(call, tmp_path):
+    rows = [{"id": k, "height": 8.0, "var": 1.0, "source": "osm"} for k in range(2)]
+    code, out, _ = call("pairs", _layer(tmp_path / "a.geojson", rows), "-o", tmp_path / "a.parquet")
+    assert code == 0
+    assert "not for commercial use: GlobalBuildingAtlas (CC BY-NC 4.0, in part ODbL)" in out
+    search = search_of_table(tmp_path / "a.parquet", 1)
+    assert "uso comercial: GlobalBuildingAtlas" in search_sentence(search.joined(search), "es")
+    # others are not restricted
+    rows = [_overture("OpenStreetMap", number) for number in range(2)]
+    call("pairs", _layer(tmp_path / "b.geojson", rows), "-o", tmp_path / "b.parquet")
+    assert "commercial" not in search_sentence(search_of_table(tmp_path / "b.parquet", 1), "en")
 
 
 def test_surveyed_columns_have_no_origin_and_the_old_deviation(tmp_path):
