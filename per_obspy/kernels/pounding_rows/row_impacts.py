@@ -356,7 +356,7 @@ def run_row_impacts(members, row, log, window, segment):
             _read_row(members, row, window)
         if elapsed >= 1.0:
             break
-    # states at the end of the step
+    # the row at the end of the step
     _write_row(members, row, window, 0, row.shape[0])
     write_steps(members, row, segment.duration)
     return elapsed >= 1.0
