@@ -105,6 +105,7 @@ class FunctionCompiler(Compiler):
         """Return the passes, which write to a library of this class."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        # Without one of them kernels would lack code: the function is left to Numba
         members = {*dir(JITCodeLibrary), *vars(state.library)}
         if not members.issuperset(INTERNALS):
             raise NotImplementedError(f"Numba without {set(INTERNALS) - members}")
