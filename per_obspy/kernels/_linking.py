@@ -8,20 +8,32 @@ Compiling takes about half as long. Results do not depend on it: where Numba's i
 from those used here, functions are compiled as Numba does by itself.
 
 Internals used (the same in Numba 0.61 to 0.68): the library of a compiler's state (as
-``BaseContext.compile_subroutine`` sets it), three flags, ``JITCodeLibrary.finalize``, and
-``Dispatcher.compile``.
+``BaseContext.compile_subroutine`` sets it), three flags, ``Dispatcher.compile``, ``finalize`` and
+`INTERNALS` of ``JITCodeLibrary``, and the linkage of llvmlite's functions.
 """
 
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from llvmlite.binding import Linkage
 from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
+
+#: Members of ``JITCodeLibrary``, looked up before any code waits for its callers: there an error
+#: would come too late.
+INTERNALS = (
+    "_codegen",
+    "_final_module",
+    "_finalized",
+    "_get_module_for_linking",
+    "_linking_libraries",
+    "_optimize_final_module",
+    "_optimize_functions",
+    "_shared_module",
+)
 
 
 class FunctionLibrary(JITCodeLibrary):
@@ -36,7 +48,7 @@ class FunctionLibrary(JITCodeLibrary):
         """Leave all to the callers, of which several may bring this code into one kernel."""
         for function in self.own_code.functions:
             if not function.is_declaration:
-                function.linkage = Linkage.linkonce_odr
+                function.linkage = "linkonce_odr"
         self._finalized = True
 
     @property
@@ -93,6 +105,10 @@ class FunctionCompiler(Compiler):
         """Return the passes, which write to a library of this class."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        # Without one of them kernels would lack code: the function is left to Numba
+        members = {*dir(JITCodeLibrary), *vars(state.library)}
+        if not members.issuperset(INTERNALS):
+            raise NotImplementedError(f"Numba without {set(INTERNALS) - members}")
         state.flags.no_compile = True
         state.flags.no_cpython_wrapper = True
         state.flags.no_cfunc_wrapper = True

@@ -18,7 +18,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     TILE_STEPS,
 )
 from per_obspy.kernels.pounding_lanes.run_block import run_block, run_lanes
-from per_obspy.kernels.pounding_rows.pieces import STATE_COLUMNS
+from per_obspy.kernels.pounding_lanes.step_by_step import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
 from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
 from per_obspy.pounding.kernel_tables import (

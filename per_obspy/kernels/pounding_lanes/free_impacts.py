@@ -33,7 +33,7 @@ UNCERTAIN, STAYS_OPEN, CLOSES_ONCE, CLOSES_NOW = 0, 1, 2, 3
 CUBIC_SHARE, LAST_SHARE = 1e-4, 1e-9
 #: Of the third Taylor coefficient: a product takes less time than a division.
 SIXTH = 1.0 / 6.0
-#: Corrections of the time of an impact, above which it is left to the event code.
+#: Corrections of the time of an event, above which it is left to the event code.
 MOST_CORRECTIONS = 10
 
 
@@ -283,6 +283,15 @@ def _guess_after_contact(series, end, share):
 
 
 @inlined
+def step_to_root(value, slope, bend, twist):
+    """Return Newton's step with curvature to the root of a cubic, and a second Newton step."""
+    inverse = 1.0 / slope
+    step = -value * inverse
+    step -= step * step * bend * inverse
+    return step, -(value + step * (slope + step * (bend + step * twist))) * inverse
+
+
+@inlined
 def locate_impact(pair, row, ends, origin, other_origin, elapsed, share, segment, has_met):
     """
     Return the time until the impact in a piece whose clearance closes once, and both states then.
@@ -315,11 +324,8 @@ def locate_impact(pair, row, ends, origin, other_origin, elapsed, share, segment
         hit_right = _state_by_ramp(pair, second, other_origin, change, now, other_ramp)
         series, rates = _clearance_series(pair, hit_left, hit_right, change, duration)
         value, slope, bend, twist = series
-        # root of the cubic: Newton's step with curvature, then a second Newton step
-        inverse = 1.0 / slope
-        step = -value * inverse
-        step -= step * step * bend * inverse
-        last = -(value + step * (slope + step * (bend + step * twist))) * inverse
+        # root of the cubic from there
+        step, last = step_to_root(value, slope, bend, twist)
         step += last
         # no impact of this piece is further away than a step
         if not abs(step) <= 1.0:

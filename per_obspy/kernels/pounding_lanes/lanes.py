@@ -7,7 +7,7 @@ records only the extremes at the samples of the tile (a time block of 32 steps).
 motion between the samples, because over a step a function leaves its chord by an eighth of the step
 squared times its largest second derivative at most. A row of buildings that may have met, parted,
 yielded or passed a maximum in the tile is stepped again from the tile's start by scalar code
-(``pair_steps``, ``row_steps``).
+(``step_by_step``).
 
 Time is measured in the angle ``omega t`` of each building: velocities are divided by its omega and
 accelerations by omega², so that all are displacements (m). All numbers are in one array, row by row

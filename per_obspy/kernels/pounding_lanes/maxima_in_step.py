@@ -20,7 +20,11 @@ from per_obspy.kernels.pounding_events.motion import (
     fill_taylor,
 )
 from per_obspy.kernels.pounding_events.next_event import fill_power, fill_velocity
-from per_obspy.kernels.pounding_lanes.free_impacts import acceleration_rate, state_inside_step
+from per_obspy.kernels.pounding_lanes.free_impacts import (
+    SIXTH,
+    acceleration_rate,
+    state_inside_step,
+)
 from per_obspy.kernels.pounding_lanes.lanes import (
     ACCELERATION,
     ACCELERATION_ERROR,
@@ -42,8 +46,6 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 NEAR = 3e-4
 #: Estimates of the time of a turning point, above which it is left to the polynomials.
 MOST_ESTIMATES = 4
-#: Of the third Taylor coefficient.
-SIXTH = 1.0 / 6.0
 
 
 @inlined

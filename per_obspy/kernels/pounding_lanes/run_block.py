@@ -32,8 +32,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 from per_obspy.kernels.pounding_lanes.phases import load_row, rest_row, write_constants
 from per_obspy.kernels.pounding_lanes.relative_in_step import is_relative_settled
 from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES, remains_still
-from per_obspy.kernels.pounding_lanes.step_by_step import step_through_tile
-from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
+from per_obspy.kernels.pounding_lanes.step_by_step import step_row_through_tile, step_through_tile
 
 #: Sampling intervals of free vibration between two checks whether a row is settled.
 SETTLING_STEPS = 16

@@ -16,7 +16,15 @@ from per_obspy.kernels.pounding_events.motion import (
     UNLOADING,
     YIELD,
 )
-from per_obspy.kernels.pounding_lanes.free_impacts import state_inside_step
+from per_obspy.kernels.pounding_lanes.free_impacts import (
+    LAST_SHARE,
+    MOST_CORRECTIONS,
+    SIXTH,
+    UNCERTAIN,
+    acceleration_rate,
+    state_inside_step,
+    step_to_root,
+)
 from per_obspy.kernels.pounding_lanes.impact_steps import set_states
 from per_obspy.kernels.pounding_lanes.lanes import (
     ACCELERATION,
@@ -35,19 +43,15 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
 )
 from per_obspy.kernels.pounding_lanes.phases import write_branch
 
-#: Predictions for a structure in a piece of a step: the last two change its stiffness.
-UNCERTAIN, STAYS, CHANGES_ONCE, CHANGES_NOW = 0, 1, 2, 3
-#: Changes of stiffness in one step, and corrections of the time of one, above which the step is
-#: left to the event code.
-MOST_CHANGES, MOST_CORRECTIONS = 4, 10
+#: Predictions for a structure in a piece of a step besides UNCERTAIN: the last two change its
+#: stiffness.
+STAYS, CHANGES_ONCE, CHANGES_NOW = 1, 2, 3
+#: Changes of stiffness in one step, above which it is left to the event code.
+MOST_CHANGES = 4
 #: Angle over which a motion is cubic but for rounding: its fourth power over 24 is 4e-18.
 CUBIC_ANGLE = 1e-4
-#: Share of a step whose square is rounding.
-LAST_SHARE = 1e-9
 #: Share of a step before its end within which a change is left to the event code.
 END_ROUNDING = 1e-12
-#: Of the third Taylor coefficient.
-SIXTH = 1.0 / 6.0
 
 
 @inlined
@@ -133,12 +137,10 @@ def predict_change(pair, first, start, end, share):
 def _rates(pair, first, state, change):
     """Return the first and second rate of an acceleration over shares of a step."""
     angle = pair[first + ANGLE]
-    by_displacement = pair[first + ACCELERATION]
-    by_velocity = pair[first + ACCELERATION + 1]
     # both derivatives of the equation of motion, where the ground is linear
-    rate = angle * (by_displacement * state[1] + by_velocity * state[2])
-    rate += pair[first + ACCELERATION + 2] * change
-    return rate, angle * (angle * by_displacement * state[2] + by_velocity * rate)
+    rate = acceleration_rate(pair, first, state, change)
+    by_displacement = angle * pair[first + ACCELERATION] * state[2]
+    return rate, angle * (by_displacement + pair[first + ACCELERATION + 1] * rate)
 
 
 @inlined
@@ -158,15 +160,6 @@ def _change_series(pair, first, side, state, rates):
     distance = pair[first + YIELD_LIMIT] - side * (u - pair[first + YIELD_CENTRE])
     scale = -side * angle
     return distance, scale * z, 0.5 * scale * angle * y, SIXTH * scale * angle * rates[0]
-
-
-@inlined
-def _step_to_root(value, slope, bend, twist):
-    """Return Newton's step with curvature to the root of a cubic, and a second Newton step."""
-    inverse = 1.0 / slope
-    step = -value * inverse
-    step -= step * step * bend * inverse
-    return step, -(value + step * (slope + step * (bend + step * twist))) * inverse
 
 
 @inlined
@@ -222,7 +215,7 @@ def locate_change(pair, row, i, start, end, change, share):
         state = state_inside_step(pair, row, i, start, change, time)
         rates = _rates(pair, first, state, change)
         value, slope, bend, twist = _change_series(pair, first, side, state, rates)
-        step, last = _step_to_root(value, slope, bend, twist)
+        step, last = step_to_root(value, slope, bend, twist)
         step += last
         # no change of this piece is further away than a step
         if not abs(step) <= 1.0:

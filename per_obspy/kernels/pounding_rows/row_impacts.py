@@ -49,7 +49,6 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, may_yield, raise_maxima
 from per_obspy.kernels.pounding_lanes.phases import update_phases, write_steps
-from per_obspy.kernels.pounding_rows.pieces import END, set_state
 from per_obspy.kernels.pounding_rows.window_lanes import (
     BEFORE,
     CLEARANCE,
@@ -313,15 +312,7 @@ def _pass_impact(members, row, log, window, hit, elapsed, segment):
 
 
 @lean
-def _write_ends(members, row, states, ground):
-    """Write the states at the end of the step."""
-    for i in range(row.shape[0]):
-        z = row[i, V] / members[i * STRUCTURE_ROWS + OMEGA]
-        set_state(states, i, END, complete_state(members, i * STRUCTURE_ROWS, row[i, U], z, ground))
-
-
-@lean
-def run_row_impacts(members, row, log, states, window, segment):
+def run_row_impacts(members, row, log, window, segment):
     """
     Carry a row through a step of impacts.
 
@@ -333,8 +324,6 @@ def run_row_impacts(members, row, log, states, window, segment):
         Its lines at the start of the step, then at its end; see `motion` for the columns.
     log : (n_lines, LOG_COLUMNS) ndarray
         Log of impacts.
-    states : (n_buildings, STATE_COLUMNS) ndarray
-        Room for states of the buildings.
     window : (WINDOW_SIZE,) ndarray
         Room for the lanes of a window; see `window_lanes` for the rows.
     segment : Segment
@@ -367,8 +356,7 @@ def run_row_impacts(members, row, log, states, window, segment):
             _read_row(members, row, window)
         if elapsed >= 1.0:
             break
-    # states at the end of the step
+    # the row at the end of the step
     _write_row(members, row, window, 0, row.shape[0])
     write_steps(members, row, segment.duration)
-    _write_ends(members, row, states, segment.acceleration + segment.slope * segment.duration)
     return elapsed >= 1.0

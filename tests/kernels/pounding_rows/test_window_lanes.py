@@ -1,8 +1,7 @@
 """
 Motion in a window of a step, against matrix exponentials and polynomials at many times.
 
-Covers ``per_obspy.kernels.pounding_rows.window_lanes`` and
-``per_obspy.kernels.pounding_rows.pieces``.
+Covers ``per_obspy.kernels.pounding_rows.window_lanes``.
 """
 
 import math
