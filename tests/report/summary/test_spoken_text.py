@@ -154,6 +154,15 @@ def test_the_page_is_one_and_no_text_leaves_it(page_text, monkeypatch, names, bu
     assert ("The worst buildings" in drawn) == buildings
 
 
+def test_a_page_in_spanish_has_no_english_class_and_no_decimal_point(page_text, monkeypatch):
+    facts = make_facts(buildings=True)
+    listed = facts.listed.assign(demand=[0.123, float("nan")])
+    figure, _ = page_text(replace(facts, language="es", listed=listed), monkeypatch)
+    drawn = [text.get_text() for text in figure.texts]
+    assert {"12,3 cm", "sin dato"} <= {*drawn}
+    assert any("1  P1, severa, " in text for text in drawn)
+
+
 def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):
     """Catch a legend that leaves the sheet, and an account that pushes the pairs off it."""
     names = ["life at risk", "very severe", "severe", "high", "moderate", "low", "lowest of all"]
