@@ -131,9 +131,11 @@ def _in_area(group: Group, rows: Mapping[str, Any]) -> "NDArray[np.bool_]":
     area = area_of(group.area)
     shapely.prepare(area)
     # Longitudes of an area across 180 degrees go on beyond it
-    inside = shapely.intersects_xy(area, east, north)
-    inside |= shapely.intersects_xy(area, east + 360.0, north)
-    return np.isfinite(east) & inside
+    inside: NDArray[np.bool_] = np.isfinite(east)
+    inside &= shapely.intersects_xy(area, east, north) | shapely.intersects_xy(
+        area, east + 360.0, north
+    )
+    return inside
 
 
 def _rows(folder: Path, group: Group, names: Sequence[str] = ()) -> dict[str, Any]:
