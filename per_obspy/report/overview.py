@@ -484,9 +484,8 @@ def _draw_gaps(
     axes.set(xlabel=texts["overview_demand"], ylabel=texts["overview_gap"])
     axes.set_title(texts["overview_gaps"], fontsize=11)
     # One scale for both axes: equal values lie on a straight line
-    linear = min(1.0, 0.1 * demand) if demand > 0 else 1.0
-    _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand, linear)
-    _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap), linear)
+    _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand, demand)
+    _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap), demand)
 
 
 def _from_zero(
@@ -494,9 +493,10 @@ def _from_zero(
     set_limits: Callable[..., object],
     axis: Axis,
     largest: float,
-    linear: float,
+    demand: float,
 ) -> None:
-    """Make an axis linear up to a value, logarithmic beyond."""
+    """Make an axis linear up to 1, or a tenth of a smaller largest demand; logarithmic beyond."""
+    linear = min(1.0, 0.1 * demand) if demand > 0 else 1.0
     set_scale("symlog", linthresh=linear)
     axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=linear, subs=(1.0, 2.0, 5.0)))
     set_limits(-0.1 * linear, 1.5 * max(largest, linear))

@@ -154,17 +154,15 @@ def _levels(table: pd.DataFrame, path: Path) -> tuple[FloatArray, FloatArray, li
     # Names such as 0.1~SA(0.5)
     found = {str(name): level for name in table if (level := _LEVEL.fullmatch(str(name)))}
     columns = {(float(level[1]), float(level[2])): name for name, level in found.items()}
-    if len(columns) < len(found):
-        raise CatalogError(str(path), "has two columns of one probability and SA")
     chances = sorted({chance for chance, _ in columns}, reverse=True)
     periods = sorted({period for _, period in columns})
-    # Every probability with every period
+    # Every probability with every period, once
     needed = [(chance, period) for chance in chances for period in periods]
-    is_full = {*needed} == {*columns} and {"lon", "lat"} <= {*table}
+    is_full = len(needed) == len(columns) == len(found) and {"lon", "lat"} <= {*table}
     if min(len(chances), len(periods)) < 2 or not is_full or periods[0] <= 0.0 or table.empty:
         raise CatalogError(
             str(path),
-            "needs lon, lat, a site, and SA as 0.1~SA(0.5) at two probabilities and two periods",
+            "needs lon, lat, a site, and SA as 0.1~SA(0.5) once at two probabilities and periods",
         )
     return np.array(chances), np.array(periods), [columns[key] for key in needed]
 

@@ -142,7 +142,7 @@ def test_half_the_chance_is_half_the_rate():
             "-0.199",
             "site 1: SA must be above 0 and plausible, in g (got -0.199)",
         ),
-        ("~PGA", "~SA(0.1)", "two columns of one probability and SA"),
+        ("~PGA", "~SA(0.1)", "SA as 0.1~SA(0.5) once at two"),
     ],
 )
 def test_a_damaged_file(tmp_path, old, new, reason):

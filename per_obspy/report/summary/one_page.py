@@ -253,6 +253,7 @@ def _write_buildings(figure: Figure, results: Results, at: float) -> None:
         left = LEFT if position < 5 else 0.52
         row = at - 0.02 - LINE * (position % 5)
         place = f"{building['latitude']:.5f}, {building['longitude']:.5f}"
+        # In the words of the language
         name = shortened(str(building["building_id"]), 24)
         severity = shortened(class_text(str(building["risk_class"]), results.texts), 12)
         words = f"{position + 1}  {name}, {severity}, {place}"
