@@ -349,7 +349,7 @@ def in_language(settings: SectionType, language: str | None) -> SectionType:
 class Totals(Section):
     """Areas by which pairs are counted: one of these settings decides."""
 
-    cell: float = Field(1000.0, gt=0, le=20_000_000, description="size of the cells of a grid, m")
+    cell: float = Field(1000.0, ge=1, le=10_000_000, description="size of the cells of a grid, m")
     area: str | None = Field(
         None, description="column of the pair table that names the area, instead of cells"
     )

@@ -115,6 +115,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
             GOOD + "[building]\ndamping = 5\n",
             r"building\.damping: .*less than 1 \(got 5\), expected: damping of .*of critical",
         ),
+        (GOOD + "[totals]\ncell = 0.5\n", r"totals\.cell: .*equal to 1 \(got 0\.5\)"),
         (GOOD + "[totals]\nh3 = 16\n", r"totals\.h3: .*less than or equal to 15 \(got 16\)"),
         (
             GOOD + '[totals]\nh3 = 8\narea = "ward"\n',
