@@ -232,7 +232,7 @@ def parsed_box(text: str) -> "Box":
         west = east = south = north = 0.0
     # NaN is not within any limit
     if not (-180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0):
-        problem = f"{text!r} is not W,S,E,N in degrees with W < E and S < N"
+        problem = f"{text!r} is not W,S,E,N in degrees with W < E (not across 180) and S < N"
         raise typer.BadParameter(problem, param_hint="--bbox")
     return west, south, east, north
 

@@ -83,5 +83,8 @@ class Engine(Section):
         description="number of further attempts of a task after a fault of a worker",
     )
     wait: float = Field(
-        300.0, ge=1, description="longest time without any usable worker before the run stops, s"
+        300.0,
+        ge=1,
+        le=604_800,
+        description="longest time without any usable worker before the run stops, s",
     )

@@ -16,7 +16,10 @@ class Scenario(Section):
     """A simulated earthquake and the stations that record it (stochastic method, Boore 2003)."""
 
     seed: int = Field(
-        20, ge=0, description="of every random number; the same seed gives the same samples"
+        20,
+        ge=0,
+        le=2**63 - 1,
+        description="of every random number; the same seed gives the same samples",
     )
     name: str = Field("Simulated earthquake", description="of the event")
     magnitude: float = Field(7.0, ge=4, le=8.5, description="moment magnitude")
@@ -24,11 +27,11 @@ class Scenario(Section):
     latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
     longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
     depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
-    quality: float = Field(180.0, gt=0, description="Q at 1 Hz (Raoof and others 1999)")
+    quality: float = Field(180.0, gt=0, le=1e5, description="Q at 1 Hz (Raoof and others 1999)")
     quality_exponent: float = Field(
         0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)"
     )
-    kappa: float = Field(0.035, ge=0, description="s; generic rock (Boore & Joyner 1997)")
+    kappa: float = Field(0.035, ge=0, le=1, description="s; generic rock (Boore & Joyner 1997)")
     stations: int = Field(24, ge=1, le=999, description="number of stations")
     city_latitude: float = Field(
         0.0, ge=-90, le=90, description="centre of the stations, degrees north"
@@ -36,16 +39,16 @@ class Scenario(Section):
     city_longitude: float = Field(
         0.3, ge=-180, le=180, description="centre of the stations, degrees east"
     )
-    city_radius: float = Field(12_000.0, gt=0, description="m")
+    city_radius: float = Field(12_000.0, gt=0, le=1e6, description="m")
     lakebed_latitude: float = Field(
         0.0, ge=-90, le=90, description="centre of the lakebed, degrees north"
     )
     lakebed_longitude: float = Field(
         0.3, ge=-180, le=180, description="centre of the lakebed, degrees east"
     )
-    lakebed_radius: float = Field(6_000.0, ge=0, description="m; 0: no lakebed")
+    lakebed_radius: float = Field(6_000.0, ge=0, le=1e6, description="m; 0: no lakebed")
     lakebed_frequency: float = Field(
-        0.5, gt=0, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6"
+        0.5, gt=0, le=50, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6"
     )
     lakebed_damping: float = Field(
         0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical"
@@ -56,7 +59,7 @@ class Scenario(Section):
         le=1.5,
         description="log-standard deviation of the Fourier spectrum between places",
     )
-    noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
+    noise: float = Field(2e-5, ge=0, le=1, description="m/s2, root mean square of the background")
     dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")
 
     @field_validator("origin_time")
@@ -69,10 +72,10 @@ class Scenario(Section):
 class SimulatedPairs(Section):
     """A simulated inventory around the stations of a run."""
 
-    count: int = Field(2000, ge=1, description="number of pairs")
-    seed: int = Field(20, ge=0, description="seed of all random numbers")
+    count: int = Field(2000, ge=1, le=1_000_000_000, description="number of pairs")
+    seed: int = Field(20, ge=0, le=2**63 - 1, description="seed of all random numbers")
     radius: float = Field(
-        2000.0, gt=0, description="largest distance of a pair from its station, m"
+        2000.0, gt=0, le=1e6, description="largest distance of a pair from its station, m"
     )
     touching: float = Field(
         0.5, ge=0, le=1, description="share of pairs without a gap, from 0 to 1"

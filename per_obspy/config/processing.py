@@ -14,11 +14,14 @@ from per_obspy.constants import (
     STORED_PERIODS,
 )
 
+#: One of two frequencies, Hz, which must rise above 0.
+Frequency = Annotated[float, Field(le=1000)]
+
 
 class Check(Section):
     """One check of a record: its limit, and the consequence of a failure."""
 
-    threshold: float = Field(description="limit of the check, in its unit")
+    threshold: float = Field(le=1e9, description="limit of the check, in its unit")
     level: str = Field(
         pattern="^(reject|warn|note)$",
         description=(
@@ -175,11 +178,12 @@ class Processing(Section):
     """Settings of the processing chain of a record (Boore 2005; gmprocess 2.8)."""
 
     highpass: float | None = Field(
-        None, gt=0, description="high-pass corner, Hz; if not set, chosen for each record"
+        None, gt=0, le=100, description="high-pass corner, Hz; if not set, chosen for each record"
     )
     lowpass: float | None = Field(
         None,
         gt=0,
+        le=1000,
         description=(
             "low-pass corner, Hz; if not set, chosen for each record; never above 0.75 of Nyquist"
         ),
@@ -196,6 +200,7 @@ class Processing(Section):
     pre_event: float | None = Field(
         None,
         ge=0,
+        le=86_400,
         description=(
             "length of the noise at the start of the record, s; if not set, until the first wave"
         ),
@@ -203,25 +208,31 @@ class Processing(Section):
     gain_tolerance: float = Field(
         0.1,
         gt=0,
+        le=10,
         description="largest relative difference between product of stage gains and sensitivity",
     )
     overlap: float = Field(
         0.8, gt=0, le=1, description="share of the longer horizontal component that both must cover"
     )
     longest_noise: float = Field(
-        120.0, gt=0, description="longest time before the first wave that is kept, s"
+        120.0, gt=0, le=86_400, description="longest time before the first wave that is kept, s"
     )
     longest_signal: float = Field(
-        600.0, gt=0, description="longest time after the first wave that is kept, s"
+        600.0, gt=0, le=86_400, description="longest time after the first wave that is kept, s"
     )
-    smoothing: float = Field(20.0, gt=0, description="bandwidth b of the Konno-Ohmachi window")
-    required_band: tuple[float, float] = Field(
+    smoothing: float = Field(
+        20.0, gt=0, le=1000, description="bandwidth b of the Konno-Ohmachi window"
+    )
+    required_band: tuple[Frequency, Frequency] = Field(
         (0.2, 10.0), description="frequencies between which the signal should exceed the noise, Hz"
     )
     highest_lowpass: float = Field(
-        40.0, gt=0, description="low-pass corner where the noise does not require a lower one, Hz"
+        40.0,
+        gt=0,
+        le=1000,
+        description="low-pass corner where the noise does not require a lower one, Hz",
     )
-    highpass_range: tuple[float, float] = Field(
+    highpass_range: tuple[Frequency, Frequency] = Field(
         (0.001, 0.5),
         description="lowest and highest high-pass corner, Hz; never below 1 / duration",
     )
@@ -236,12 +247,13 @@ class Processing(Section):
     baseline_spread: float = Field(
         0.05,
         gt=0,
+        le=10,
         description=(
             "largest deviation of ln PER between possible times of a baseline shift; usable "
             "periods end where it is exceeded"
         ),
     )
-    fallback_highpass: dict[float, Annotated[float, Field(gt=0)]] = Field(
+    fallback_highpass: dict[float, Annotated[float, Field(gt=0, le=100)]] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
         description=(
             "high-pass corner, Hz, of records without noise to measure, by smallest "
@@ -251,6 +263,7 @@ class Processing(Section):
     unknown_highpass: float = Field(
         0.08,
         gt=0,
+        le=100,
         description=(
             "high-pass corner of records without noise to measure and without a magnitude, Hz"
         ),
@@ -297,7 +310,10 @@ class Spectra(Section):
         description="dampings of the stored spectra, fractions of critical, ascending",
     )
     shortest: float = Field(
-        SHORTEST_STORED_PERIOD, ge=0.001, description="shortest period of the stored spectra, s"
+        SHORTEST_STORED_PERIOD,
+        ge=0.001,
+        le=100,
+        description="shortest period of the stored spectra, s",
     )
     longest: float = Field(
         LONGEST_STORED_PERIOD, le=100.0, description="longest period of the stored spectra, s"

@@ -39,22 +39,22 @@ class Columns(Section):
     latitude: float = Field(ge=-90, le=90, description="latitude of the station, degrees north")
     longitude: float = Field(ge=-180, le=180, description="longitude of the station, degrees east")
     units: str = Field(description="unit of the samples: m/s2, cm/s2, gal or g")
-    channels: dict[str, int] = Field(
+    channels: dict[str, Annotated[int, Field(ge=0, le=10_000)]] = Field(
         description="column of each channel, counted from 0: channel code = column"
     )
-    azimuths: dict[str, float] = Field(
+    azimuths: dict[str, Annotated[float, Field(ge=-360, le=360)]] = Field(
         default_factory=dict,
         description="azimuth of each channel, degrees clockwise from north: channel code = azimuth",
     )
     separator: str | None = Field(
         None, description="character between columns; white space if not set"
     )
-    skip: int = Field(0, ge=0, description="number of header lines to skip")
+    skip: int = Field(0, ge=0, le=1_000_000_000, description="number of header lines to skip")
     time_column: int | None = Field(
-        None, ge=0, description="column of time in s, checked for even spacing"
+        None, ge=0, le=10_000, description="column of time in s, checked for even spacing"
     )
     dt: float | None = Field(
-        None, gt=0, description="sampling interval, s, for tables without a time column"
+        None, gt=0, le=3600, description="sampling interval, s, for tables without a time column"
     )
     start: str | None = Field(None, description="time of the first sample, ISO 8601, UTC")
     raw: bool = Field(False, description="whether the record is uncorrected")
@@ -120,10 +120,10 @@ class Window(Section):
         ),
     )
     before: float = Field(
-        30.0, ge=0, description="time from the start of the window to the origin time, s"
+        30.0, ge=0, le=86_400, description="time from the start of the window to the origin time, s"
     )
     after: float = Field(
-        300.0, gt=0, description="time from the origin time to the end of the window, s"
+        300.0, gt=0, le=86_400, description="time from the origin time to the end of the window, s"
     )
 
 
@@ -161,7 +161,7 @@ class Fdsn(Window):
         ),
     )
     shakemap_version: int | None = Field(
-        None, ge=1, description="version of the ShakeMap; if not set, the preferred one"
+        None, ge=1, le=100_000, description="version of the ShakeMap; if not set, the preferred one"
     )
     latitude: float | None = Field(
         None,
@@ -195,11 +195,12 @@ class Fdsn(Window):
         description="SEED channel codes; * and ? are wildcards; accelerometers by default",
     )
     timeout: float = Field(
-        60.0, gt=0, description="longest time without an answer, or without more of it, s"
+        60.0, gt=0, le=3600, description="longest time without an answer, or without more of it, s"
     )
     retries: int = Field(
         5,
         ge=0,
+        le=100,
         description=(
             "number of further attempts after a temporary fault (429, 5xx, time-out, cut answer)"
         ),
@@ -207,6 +208,7 @@ class Fdsn(Window):
     wait: float = Field(
         1.0,
         ge=0,
+        le=3600,
         description=(
             "time before the second attempt, s; it doubles with each further one, and "
             "Retry-After counts"
@@ -249,6 +251,7 @@ class Archives(Section):
     largest_member: int = Field(
         512 * 2**20,
         gt=0,
+        le=2**50,
         description=(
             "largest size of one unpacked file of an archive, bytes; larger files are left out"
         ),
@@ -256,6 +259,7 @@ class Archives(Section):
     largest_total: int = Field(
         8 * 2**30,
         gt=0,
+        le=2**50,
         description=(
             "largest size of all unpacked files of an archive, bytes; larger archives are left out"
         ),
@@ -263,6 +267,7 @@ class Archives(Section):
     largest_ratio: float = Field(
         200.0,
         ge=1,
+        le=1e6,
         description=(
             "largest ratio of unpacked to packed size of an archive, checked from 64 MiB "
             "on; archives above it are left out"

@@ -22,7 +22,7 @@ class Run(Section):
 
     name: str = Field(min_length=1, description="title of tables and figures")
     output: RelativePath = Field(description="folder of the results")
-    workers: int = Field(0, ge=0, description="number of processes; 0: one per processor")
+    workers: int = Field(0, ge=0, le=1024, description="number of processes; 0: one per processor")
     simulation: RelativePath | None = Field(
         None, description="TOML file of an event to simulate instead of records"
     )
@@ -41,11 +41,13 @@ class Run(Section):
     csv_rows: int = Field(
         100_000,
         ge=1,
+        le=1_000_000_000,
         description="largest number of rows in risk.csv, the worst ones; the Parquet file has all",
     )
     dataset_from: int = Field(
         20_000_000,
         ge=1,
+        le=1_000_000_000_000,
         description="number of pairs from which the ranked table is a folder risk/ with one "
         "Parquet file per cell, instead of one file risk.parquet",
     )
@@ -140,9 +142,9 @@ class EnsembleScenario(Section):
     )
     run: RelativePath = Field(description="TOML file of its run")
     weight: float | None = Field(
-        None, ge=0, description="probability of the scenario relative to the others"
+        None, ge=0, le=1e9, description="probability of the scenario relative to the others"
     )
-    rate: float | None = Field(None, ge=0, description="how often it happens, 1/year")
+    rate: float | None = Field(None, ge=0, le=1e6, description="how often it happens, 1/year")
 
 
 class Ensemble(Section):
@@ -153,7 +155,10 @@ class Ensemble(Section):
     scenario: tuple[EnsembleScenario, ...] = Field(min_length=1)
     report: ReportTexts = ReportTexts()
     csv_rows: int = Field(
-        100_000, ge=1, description="largest number of rows in ensemble.csv, the worst"
+        100_000,
+        ge=1,
+        le=1_000_000_000,
+        description="largest number of rows in ensemble.csv, the worst",
     )
     geopackage: bool = Field(
         False, description="write ensemble.gpkg, ensemble.qgz and GeoParquet; needs per_obspy[gis]"

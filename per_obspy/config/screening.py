@@ -37,7 +37,7 @@ class Building(Section):
         description="damping of buildings without a known one, fraction of critical",
     )
     damping_log_std: float = Field(
-        0.3, ge=0, description="log-standard deviation of an assumed damping"
+        0.3, ge=0, le=2, description="log-standard deviation of an assumed damping"
     )
     storey_height: float = Field(
         3.0, ge=2, le=12, description="height of a storey for heights derived from storeys, m"
@@ -108,6 +108,7 @@ class Interpolation(Section):
     log_std: float = Field(
         0.6,
         gt=0,
+        le=3,
         description=(
             "assumed log-standard deviation of PER within an earthquake; published for SA: "
             "0.5 to 0.7"
@@ -116,6 +117,7 @@ class Interpolation(Section):
     log_std_weight: float = Field(
         5.0,
         gt=2,
+        le=1e6,
         description=(
             "number of stations that log_std counts as; above 2, because Student's t "
             "distribution of the motion has no deviation below"
@@ -131,11 +133,12 @@ class Interpolation(Section):
         ),
     )
     distance_slope_std: float = Field(
-        0.5, gt=0, description="standard deviation of distance_slope between earthquakes"
+        0.5, gt=0, le=1e6, description="standard deviation of distance_slope between earthquakes"
     )
     demand_log_std: float = Field(
         0.55,
         ge=0,
+        le=3,
         description=(
             "log-standard deviation of an exact demand about the demand expected from the "
             "motion between stations, far from the record of the pair (docs/calibration.md)"
@@ -144,6 +147,7 @@ class Interpolation(Section):
     demand_length: float = Field(
         4000.0,
         gt=0,
+        le=20_000_000,
         description=(
             "distance from the record at which the correlation of the particular part of "
             "its demand has fallen to 1/e of the way from 1 to demand_persistence, m"
@@ -239,19 +243,26 @@ class Screening(Section):
     largest_distance: float = Field(
         20_000.0,
         gt=0,
+        le=20_000_000,
         description="largest distance from station to pair, m; pairs beyond are rejected",
     )
     flag_distance: float = Field(
-        5_000.0, gt=0, description="distance from station to pair beyond which it is flagged, m"
+        5_000.0,
+        gt=0,
+        le=20_000_000,
+        description="distance from station to pair beyond which it is flagged, m",
     )
     exact: bool = Field(
         True, description="exact demand and history of every pair; false: estimates only, faster"
     )
     states: States = States()
     per_to_sd: float = Field(
-        1.5, ge=1, description="ratio PER/SD above which a gap from PER is flagged as far too large"
+        1.5,
+        ge=1,
+        le=1000,
+        description="ratio PER/SD above which a gap from PER is flagged as far too large",
     )
-    classes: dict[str, Annotated[float, Field(ge=0, allow_inf_nan=False)]] = Field(
+    classes: dict[str, Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]] = Field(
         {"severe": 0.5, "high": 0.2, "moderate": 0.05, "low": 0.0},
         description=(
             "smallest expected impact velocity of each risk class, m/s, in descending order "
@@ -262,6 +273,7 @@ class Screening(Section):
     linearized_median: float = Field(
         2.7,
         gt=0,
+        le=100,
         description=(
             "median of the ratio of the linearized critical gap of yielding pairs to the "
             "exact one, where the linearized gap decides"
@@ -270,6 +282,7 @@ class Screening(Section):
     linearized_dispersion: float = Field(
         0.65,
         ge=0,
+        le=3,
         description=(
             "log-standard deviation of the ratio of the linearized critical gap of yielding "
             "pairs to the exact one"
@@ -278,11 +291,13 @@ class Screening(Section):
     target_amplification: float = Field(
         1.25,
         ge=1,
+        le=100,
         description="largest ratio of PER after to PER before an impact that a bumper may allow",
     )
     shakemap_log_std: float = Field(
         0.6,
         gt=0,
+        le=3,
         description="assumed log-standard deviation of a ShakeMap without uncertainty",
     )
     interpolation: Interpolation = Field(
@@ -308,6 +323,7 @@ class ReportTexts(Section):
     revision: int = Field(
         0,
         ge=0,
+        le=1_000_000,
         description="revision on page and summary; 0: the number that watch gives, if any",
     )
     background: RelativePath | None = Field(
@@ -333,7 +349,7 @@ def in_language(settings: SectionType, language: str | None) -> SectionType:
 class Totals(Section):
     """Areas by which pairs are counted: one of these settings decides."""
 
-    cell: float = Field(1000.0, gt=0, description="size of the cells of a grid, m")
+    cell: float = Field(1000.0, ge=1, le=10_000_000, description="size of the cells of a grid, m")
     area: str | None = Field(
         None, description="column of the pair table that names the area, instead of cells"
     )

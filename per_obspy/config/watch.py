@@ -78,7 +78,7 @@ class Watch(Section):
         le=10,
         description="magnitude assumed for an earthquake without one, to decide whether it matters",
     )
-    delays: tuple[float, ...] = Field(
+    delays: tuple[Annotated[float, Field(le=315_360_000)], ...] = Field(
         (120.0, 300.0, 900.0, 3600.0, 86_400.0),
         min_length=1,
         description="times from the origin time to each run, s, ascending",
@@ -86,6 +86,7 @@ class Watch(Section):
     latency: float = Field(
         60.0,
         ge=0,
+        le=315_360_000,
         description=(
             "time that records need to reach their service, s: the window of a run ends "
             "this long before its delay, unless the configured window ends earlier"
@@ -106,6 +107,7 @@ class Watch(Section):
     oldest: float = Field(
         7 * 86_400.0,
         gt=0,
+        le=315_360_000,
         description="age of an earthquake beyond which it is neither opened nor polled, s",
     )
     updatedafter: bool = Field(
@@ -198,7 +200,10 @@ class Group(AppriseUrls):
     )
     least_class: str = Field(description="least risk class that counts, of screening.classes")
     least_count: int = Field(
-        1, ge=1, description="number of pairs of this class or worse from which there is a message"
+        1,
+        ge=1,
+        le=1_000_000_000,
+        description="number of pairs of this class or worse from which there is a message",
     )
     language: Language = Field("en", description=f"of the messages: {' or '.join(LANGUAGES)}")
 

@@ -267,7 +267,7 @@ def _amplitude(amplitude: Mapping[str, Any]) -> tuple[float | str, float]:
         raise ValueError(f"{name}: unit {shortened(unit, SHOWN)!r}, expected {', '.join(units)}")
     value = _number(amplitude["value"]) * units[unit]
     if not 0.0 < value <= limit:
-        raise ValueError(f"{name} = {shortened(str(amplitude['value']), SHOWN)} {unit}")
+        raise ValueError(f"{name} = {shortened(repr(amplitude['value']), SHOWN)} {unit}")
     period = float(spectral[1]) if spectral else math.inf
     # A period of 0 is the peak under another name
     if not period > 0.0:

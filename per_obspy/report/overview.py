@@ -478,22 +478,25 @@ def _draw_gaps(
     # The demand of the medians; the class is that of the whole population
     largest = 100 * table[["demand", "gap"]].max().to_numpy(np.float64)
     demand, gap = np.where(np.isfinite(largest), largest, 0.0).tolist()
-    # Scales of both axes differ: equal values lie on a curve
-    equal = np.linspace(0.0, demand, 500)
-    axes.plot(equal, equal, color=MOTION_COLOUR, linewidth=0.8)
+    axes.plot([0.0, demand], [0.0, demand], color=MOTION_COLOUR, linewidth=0.8)
     # Next to its end, where no mark is hidden
     axes.annotate(texts["overview_equal"], (demand, demand), ha="right", va="bottom", fontsize=8)
     axes.set(xlabel=texts["overview_demand"], ylabel=texts["overview_gap"])
     axes.set_title(texts["overview_gaps"], fontsize=11)
-    _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand)
-    _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap))
+    # One scale for both axes: equal values lie on a straight line
+    _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand, demand)
+    _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap), demand)
 
 
 def _from_zero(
-    set_scale: Callable[..., object], set_limits: Callable[..., object], axis: Axis, largest: float
+    set_scale: Callable[..., object],
+    set_limits: Callable[..., object],
+    axis: Axis,
+    largest: float,
+    demand: float,
 ) -> None:
-    """Make an axis linear up to 1, or to a tenth of a smaller largest value; logarithmic beyond."""
-    linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
+    """Make an axis linear up to 1, or a tenth of a smaller largest demand; logarithmic beyond."""
+    linear = min(1.0, 0.1 * demand) if demand > 0 else 1.0
     set_scale("symlog", linthresh=linear)
     axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=linear, subs=(1.0, 2.0, 5.0)))
     set_limits(-0.1 * linear, 1.5 * max(largest, linear))

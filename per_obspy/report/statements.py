@@ -67,8 +67,10 @@ def alert(results: Results) -> Alert:
     """Return the alert of a screening."""
     texts, tally, level = results.texts, results.tally, _level(results)
     is_known = tally.pairs > tally.states["unknown"]
-    # Pairs without a verdict may be worse
-    key = "alert_level_least" if results.coverage.lacks_many else "alert_level"
+    # Pairs without a verdict may be worse; what is at least none is unknown
+    key = "alert_level"
+    if results.coverage.lacks_many:
+        key = "alert_level_least" if level else "alert_level_unknown"
     # When and how the results were made, and that nobody has reviewed them
     time, issued = shortened(results.revision.time, 20), texts["alert_issued"]
     status = texts["alert_status_yielding" if tally.yielding else "alert_status"]

@@ -61,7 +61,8 @@ SMALLEST_DEMAND = 0.001
 #: least one.
 NEGLIGIBLE = 0.01
 
-_LEVEL = re.compile(r"(0?\.\d+(?:[eE]-?\d+)?|\d(?:\.\d+)?[eE]-\d+)~SA\((\d+(?:\.\d+)?)\)")
+#: Probability and period of a column; the name of a repeated one is numbered by pandas.
+_LEVEL = re.compile(r"(0?\.\d+(?:[eE]-?\d+)?|\d(?:\.\d+)?[eE]-\d+)~SA\((\d+(?:\.\d+)?)\)(?:\.\d+)?")
 _YEARS = re.compile(r"investigation_time=(\d+(?:\.\d*)?)")
 
 
@@ -135,10 +136,17 @@ def _check(path: Path, east: FloatArray, north: FloatArray, psa: FloatArray) -> 
     placed = (np.abs(east) <= 180.0) & (np.abs(north) <= 90.0)
     _require(path, placed, "lon, lat: not in degrees")
     plausible = (psa > 0.0) & (psa <= LARGEST["psa"][0])
-    _require(path, plausible.all(axis=(1, 2)), "SA must be above 0 and plausible, in g")
+    odd = psa[~plausible] / STANDARD_GRAVITY
+    problem = f"SA must be above 0 and plausible, in g (got {odd[0]:g})" if odd.size else ""
+    _require(path, plausible.all(axis=(1, 2)), problem)
     # Rarer motions are stronger at every period
     grows = (np.diff(psa, axis=1) > 0.0).all(axis=(1, 2))
     _require(path, grows, "SA must grow as the probability falls")
+    # Of several spectra of one place chance would take one
+    sites = pd.DataFrame(psa.reshape(len(psa), -1)).assign(lon=east, lat=north).drop_duplicates()
+    again = np.zeros(len(psa), dtype=bool)
+    again[sites.index] = sites.duplicated(["lon", "lat"])
+    _require(path, ~again, "has another SA than an earlier row of the same lon, lat")
 
 
 def _levels(table: pd.DataFrame, path: Path) -> tuple[FloatArray, FloatArray, list[str]]:
@@ -148,13 +156,13 @@ def _levels(table: pd.DataFrame, path: Path) -> tuple[FloatArray, FloatArray, li
     columns = {(float(level[1]), float(level[2])): name for name, level in found.items()}
     chances = sorted({chance for chance, _ in columns}, reverse=True)
     periods = sorted({period for _, period in columns})
-    # Every probability with every period
+    # Every probability with every period, once
     needed = [(chance, period) for chance in chances for period in periods]
-    is_full = {*needed} == {*columns} and {"lon", "lat"} <= {*table}
+    is_full = len(needed) == len(columns) == len(found) and {"lon", "lat"} <= {*table}
     if min(len(chances), len(periods)) < 2 or not is_full or periods[0] <= 0.0 or table.empty:
         raise CatalogError(
             str(path),
-            "needs lon, lat, a site, and SA as 0.1~SA(0.5) at two probabilities and two periods",
+            "needs lon, lat, a site, and SA as 0.1~SA(0.5) once at two probabilities and periods",
         )
     return np.array(chances), np.array(periods), [columns[key] for key in needed]
 

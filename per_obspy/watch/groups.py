@@ -59,7 +59,8 @@ def area_of(file: Path) -> "Geometry":
 
     # Anything but whole polygons would contain no pair, and nobody would hear of any
     polygons = _polygons(file)
-    if not len(polygons) or not (shapely.get_dimensions(polygons) == 2).all():
+    is_polygon = (shapely.get_dimensions(polygons) == 2) & ~shapely.is_empty(polygons)
+    if not len(polygons) or not is_polygon.all():
         raise CatalogError(str(file), "holds something else than polygons")
     if not (is_valid := shapely.is_valid(polygons)).all():
         fault = shapely.is_valid_reason(polygons[~is_valid][0])
@@ -104,36 +105,55 @@ def counts_of(folder: Path, group: Group, classes: Mapping[str, float]) -> dict[
     Raises
     ------
     CatalogError
-        If the table lacks a column, or the area cannot be read.
+        If the table lacks a column, no pair of it is in the area or has the values, or the area
+        cannot be read.
     """
     # Classes of a configuration are in the order of their thresholds
     names = [*classes][: [*classes].index(group.least_class) + 1]
     rows = _rows(folder, group, names)
-    found = np.asarray(rows["risk_class"], dtype=str)
-    if group.area:
-        import shapely
-
-        # A pair without a place is in no area
-        area = area_of(group.area)
-        shapely.prepare(area)
-        east, north = (np.ma.filled(rows[name], np.nan) for name in ("longitude", "latitude"))
-        found = found[np.isfinite(east) & shapely.intersects_xy(area, east, north)]
+    inside = _in_area(group, rows)
+    # A wrong value or area would be silence for ever
+    if not inside.any() and not _in_area(group, _rows(folder, group)).any():
+        problem = "no pair of the risk table is in its area and has its values"
+        raise CatalogError(f"notify.groups: {group.name}", problem)
+    found = np.asarray(rows["risk_class"], dtype=str)[inside]
     counts = {name: int(np.count_nonzero(found == name)) for name in names}
     return {name: count for name, count in counts.items() if count}
 
 
-def _rows(folder: Path, group: Group, names: Sequence[str]) -> dict[str, Any]:
-    """Return class and place of the pairs of some classes that have the values of a group."""
+def _in_area(group: Group, rows: Mapping[str, Any]) -> "NDArray[np.bool_]":
+    """Return the pairs in the area of a group; one without a place is in no area."""
+    east, north = (np.ma.filled(rows[name], np.nan) for name in ("longitude", "latitude"))
+    if not group.area:
+        return np.ones(len(east), dtype=bool)
+    import shapely
+
+    area = area_of(group.area)
+    shapely.prepare(area)
+    # Longitudes of an area across 180 degrees go on beyond it
+    inside: NDArray[np.bool_] = np.isfinite(east)
+    inside &= shapely.intersects_xy(area, east, north) | shapely.intersects_xy(
+        area, east + 360.0, north
+    )
+    return inside
+
+
+def _rows(folder: Path, group: Group, names: Sequence[str] = ()) -> dict[str, Any]:
+    """Return places of the pairs that have the values of a group, and classes if some are asked."""
     files = [str(file) for file in table_files(folder)]
-    # Any name is a column between quotation marks
-    columns = [name.replace('"', '""') for name in group.where]
-    terms = ["list_contains(?, risk_class)"]
-    terms += [f'CAST("{name}" AS VARCHAR) = ?' for name in columns]
-    query = "SELECT risk_class, longitude, latitude FROM read_parquet(?) WHERE "
-    values = [files, names, *group.where.values()]
+    query, values = "SELECT longitude, latitude FROM read_parquet(?) WHERE true", list[Any]([files])
+    if names:
+        query = query.replace(" FROM", ", risk_class FROM") + " AND list_contains(?, risk_class)"
+        values.append(names)
+    for name, value in group.where.items():
+        # Any name is a column between quotation marks; a number is equal however it is written
+        column = '"' + name.replace('"', '""') + '"'
+        query += f" AND (CAST({column} AS VARCHAR) = ? OR (typeof({column}) <> 'VARCHAR'"
+        query += f" AND TRY_CAST(CAST({column} AS VARCHAR) AS DOUBLE) = TRY_CAST(? AS DOUBLE)))"
+        values += [value, value]
     try:
         with duckdb.connect() as database:
-            return database.execute(query + " AND ".join(terms), values).fetchnumpy()
+            return database.execute(query, values).fetchnumpy()
     except duckdb.BinderException as error:
         problem = f"the risk table has not all columns of {', '.join(group.where)}"
         raise CatalogError(f"notify.groups: {group.name}: where", problem) from error

@@ -115,6 +115,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
             GOOD + "[building]\ndamping = 5\n",
             r"building\.damping: .*less than 1 \(got 5\), expected: damping of .*of critical",
         ),
+        (GOOD + "[totals]\ncell = 0.5\n", r"totals\.cell: .*equal to 1 \(got 0\.5\)"),
         (GOOD + "[totals]\nh3 = 16\n", r"totals\.h3: .*less than or equal to 15 \(got 16\)"),
         (
             GOOD + '[totals]\nh3 = 8\narea = "ward"\n',
@@ -148,6 +149,13 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         (
             GOOD.replace('folder = "in"\n', ""),
             r"records: give at least one of folder, columns, fdsn",
+        ),
+        (
+            GOOD.replace(
+                'folder = "in"',
+                'fdsn = {providers = ["x"], cache = "c", event_id = "e", after = 1e12}',
+            ),
+            r"records\.fdsn\.after: .*to 86400 \(got 1000000000000\.0\), expected: time from",
         ),
         (GOOD + 'simulation = "s.toml"\n', r"pairs\.simulation: unknown key"),
         ('simulation = "s.toml"\n' + GOOD, r"give either simulation or records"),
@@ -266,3 +274,22 @@ def test_an_empty_path_is_refused():
     # would catch results in the folder of the configuration itself
     with pytest.raises(CatalogError, match="output: the path is empty: name a file or folder"):
         checked(Run, {"name": "a", "output": "", "simulation": "b.toml"})
+
+
+def _unlimited(schema, name=""):
+    """Yield the numbers of a schema that have no upper limit."""
+    limits = {"maximum", "exclusiveMaximum"}
+    if isinstance(schema, list):
+        for part in schema:
+            yield from _unlimited(part, name)
+    elif isinstance(schema, dict):
+        if schema.get("type") in ("number", "integer") and not limits & schema.keys():
+            yield name
+        for key, part in schema.items():
+            yield from _unlimited(part, name if key in ("anyOf", "items") else f"{name}.{key}")
+
+
+def test_every_number_has_an_upper_limit():
+    # 1e12 s after an earthquake, or a million workers, once ended in a traceback, or hours later
+    schemas = {**Run.model_json_schema(), "ensemble": Ensemble.model_json_schema()}
+    assert not list(_unlimited([schemas, Simulation.model_json_schema()]))

@@ -1,5 +1,7 @@
 """Pairs under a hazard: laws of Poisson and Cornell, monotone gaps, and files of OpenQuake."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_less
@@ -135,7 +137,12 @@ def test_half_the_chance_is_half_the_rate():
         ("\n20.0,10.0", "\n200.0,10.0", "site 1: lon, lat"),
         ("\n20.0,10.0", "\n20.0,x", "site 1: lon, lat"),
         ("\n20.0,10.0,", "\n20.0,10.0,1,", "more fields than its header"),
-        ("0.1990535852767486", "-0.199", "site 1: SA must"),
+        (
+            "0.1990535852767486",
+            "-0.199",
+            "site 1: SA must be above 0 and plausible, in g (got -0.199)",
+        ),
+        ("~PGA", "~SA(0.1)", "SA as 0.1~SA(0.5) once at two"),
     ],
 )
 def test_a_damaged_file(tmp_path, old, new, reason):
@@ -146,5 +153,15 @@ def test_a_damaged_file(tmp_path, old, new, reason):
     if reason is None:  # a measure less is no fault
         assert read_hazard(path).periods.size == len(PERIODS) - 1
         return
-    with pytest.raises(CatalogError, match=reason.replace("(", r"\(")):
+    with pytest.raises(CatalogError, match=re.escape(reason)):
+        read_hazard(path)
+
+
+def test_two_spectra_of_one_place_are_refused(tmp_path):
+    # would catch a mean and a quantile in one file, of which the first row would decide
+    path = write_hazard(tmp_path / "h.csv", sites=((20.0, 10.0), (20.0, 10.0)))
+    assert read_hazard(path).longitude.size == 2
+    *rows, last = path.read_text().splitlines()
+    path.write_text("\n".join([*rows, last.replace("0.1990535852767486", "0.19")]))
+    with pytest.raises(CatalogError, match="site 2: has another SA"):
         read_hazard(path)

@@ -136,7 +136,7 @@ HOSTILE = {
     "unit": (feature(channels=[channel("HN1", LARGE, units="g")]), "sa(0.3): unit 'g', expected"),
     "negative": (feature(channels=[channel("N", {"sa(1)": -1, "sa(3)": 1.0})]), "sa(1) = -1 %g"),
     "too large": (feature(channels=[channel("N", {"sa(1)": 4e3, "sa(3)": 1})]), "sa(1) = 4000"),
-    "no number": (feature(channels=[channel("N", {"sa(1)": "x", "sa(3)": 1})]), "sa(1) = x %g"),
+    "no number": (feature(channels=[channel("N", {"sa(1)": "x", "sa(3)": 1})]), "sa(1) = 'x' %g"),
     "null": (feature(channels=[channel("N", {"sa(1)": None, "sa(3)": "null"})]), "no period"),
     "no channels": (feature(channels={"a": 1}), "no period"),
     "displacement": (feature(channels=[channel("N", {"sa(1)": 1, "sa(20)": 50})]), "= 49.7 m"),

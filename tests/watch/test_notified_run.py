@@ -7,9 +7,11 @@ import pandas as pd
 import pytest
 
 from per_obspy.config import Run, checked
+from per_obspy.config.watch import Group
 from per_obspy.errors import CatalogError
 from per_obspy.runs.output_folder import Result
 from per_obspy.watch import notified_run as module
+from per_obspy.watch.groups import counts_of
 from per_obspy.watch.notified_run import class_counts, notified_run, notify_result, undelivered
 
 
@@ -171,7 +173,7 @@ def test_a_group_hears_of_its_area_from_its_threshold_on_and_of_changes_there_on
     assert told(["severe", "low", "low"], [0.5, 1.5, 0.2]) == {}
     assert told(["severe", "low", "low"], [0.5, 1.5, 0.2]) == {}
     # The inventory has lost a column: two groups are told as before, and the reason is a fact
-    table = result_of(tmp_path / "out", ["severe", "severe"], [0.5, 0.6])
+    table = result_of(tmp_path / "out", ["severe", "severe", "low"], [0.5, 0.6, 1.5])
     pd.read_parquet(tmp_path / "out" / "risk.parquet").drop(columns="quarter").to_parquet(
         tmp_path / "out" / "risk.parquet"
     )
@@ -179,6 +181,27 @@ def test_a_group_hears_of_its_area_from_its_threshold_on_and_of_changes_there_on
     assert "notification of Seven: notify.groups: Seven: where: the risk table has not" in reason
     assert undelivered([tmp_path / "out"]) == reason
     assert sent[1]()[-1][0]["PER_OBSPY_TITLE"] == "Town: West: 2 severe (before: 1 severe)"
+
+
+def test_pairs_of_a_group_are_found_however_their_values_are_written(tmp_path):
+    # would catch groups that hear nothing for ever: a column of numbers with an empty cell, an
+    # area across 180 degrees; text with a zero in front is another quarter
+    folder = result_of(tmp_path / "out", ["high"] * 3, [-179.5, 179.5, 0.0]).folder
+    table = pd.read_parquet(folder / "risk.parquet")
+    table.assign(quarter=[7.0, 8.0, None], code=["7", "07", None]).to_parquet(
+        folder / "risk.parquet"
+    )
+    (tmp_path / "area").write_text("POLYGON ((179 0, 181 0, 181 1, 179 1, 179 0))")
+
+    def count(**choice):
+        group = Group(name="a", address="b", least_class="high", **choice)
+        return sum(counts_of(folder, group, {"high": 0.0}).values())
+
+    assert count(where={"quarter": "7"}) == count(where={"code": "7"}) == 1
+    assert count(area=tmp_path / "area") == 2
+    for nobody in ({"quarter": "9"}, {"code": 'it\'s "7"'}, {"code": "8", "quarter": "8"}):
+        with pytest.raises(CatalogError, match="groups: a: no pair of the risk table is"):
+            count(where=nobody)
 
 
 @pytest.mark.parametrize(
@@ -194,6 +217,7 @@ def test_a_group_hears_of_its_area_from_its_threshold_on_and_of_changes_there_on
         ({"apprise_urls_variable": "URLS"}, r"notify\.groups\.0: give either address"),
         ({"area": "absent"}, r"notify\.groups\.0\.area: absent: cannot be read.*No such file"),
         ({"area": "POINT (1 2)"}, r"groups\.0\.area: .*holds something else than polygons"),
+        ({"area": "POLYGON EMPTY"}, r"groups\.0\.area: .*holds something else than polygons"),
         ({"area": "POLYGON ((0 0, 1 1, 0 1, 1 0, 0 0))"}, "not valid: Self-intersection"),
         ({"area": "POLYGON ((0 0, 9999 0, 9999 9, 0 0))"}, "is not in degrees"),
         ({"area": '{"type": "Nonsense"}'}, "cannot be read as GeoJSON or WKT"),

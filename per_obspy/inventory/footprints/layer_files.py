@@ -374,6 +374,10 @@ def _read_geoparquet(file: Path, source: str, box: Box | None = None) -> RawLaye
     name, crs = _geometry_column(source, table)
     if box is not None and not is_in_degrees(crs):
         raise CatalogError(source, "a box needs outlines in longitude and latitude")
+    if box is not None and table.num_rows == 0:
+        raise CatalogError(
+            source, f"no building touches the box {','.join(map(str, box))} (W,S,E,N)"
+        )
     return _raw_layer(source, table, table.column_names.index(name), crs)
 
 
@@ -382,12 +386,24 @@ def _touching(file: Path, source: str, box: Box) -> pc.Expression:
     # A box in another form is none
     schema = pa.parquet.read_schema(file.absolute())
     kind = schema.field("bbox").type if "bbox" in schema.names else pa.null()
-    names = {field.name for field in kind} if pa.types.is_struct(kind) else set()
+    fields = kind if pa.types.is_struct(kind) else ()
+    names = {field.name for field in fields if pa.types.is_floating(field.type)}
     if not names >= {"xmin", "xmax", "ymin", "ymax"}:
-        raise CatalogError(source, "a box needs a column bbox with xmin, xmax, ymin and ymax")
+        problem = "a box needs a column bbox with numbers xmin, xmax, ymin and ymax, in degrees"
+        raise CatalogError(source, problem)
     west, south, east, north = box
-    across = (pc.field("bbox", "xmin") <= east) & (pc.field("bbox", "xmax") >= west)
-    return across & (pc.field("bbox", "ymin") <= north) & (pc.field("bbox", "ymax") >= south)
+    # A feature without limits may be anywhere, and is kept
+    return (
+        _unless(pc.field("bbox", "xmin") > east)
+        & _unless(pc.field("bbox", "xmax") < west)
+        & _unless(pc.field("bbox", "ymin") > north)
+        & _unless(pc.field("bbox", "ymax") < south)
+    )
+
+
+def _unless(is_outside: pc.Expression) -> pc.Expression:
+    """Return where a comparison is false, or has no value to compare."""
+    return ~is_outside | is_outside.is_null()
 
 
 def is_in_degrees(crs: Any) -> bool:

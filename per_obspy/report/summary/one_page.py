@@ -224,8 +224,8 @@ def _number_cells(pair: dict[Hashable, Any], language: str) -> list[str]:
     return [
         speed_text(number(pair, "expected_impact_velocity"), language),
         chance_text(number(pair, "probability"), language),
-        length_text(number(pair, "gap")),
-        length_text(number(pair, "demand")) if "demand" in pair else "",
+        length_text(number(pair, "gap"), language),
+        length_text(number(pair, "demand"), language) if "demand" in pair else "",
     ]
 
 
@@ -253,7 +253,9 @@ def _write_buildings(figure: Figure, results: Results, at: float) -> None:
         left = LEFT if position < 5 else 0.52
         row = at - 0.02 - LINE * (position % 5)
         place = f"{building['latitude']:.5f}, {building['longitude']:.5f}"
+        # In the words of the language
         name = shortened(str(building["building_id"]), 24)
-        words = f"{position + 1}  {name}, {shortened(str(building['risk_class']), 12)}, {place}"
+        severity = shortened(class_text(str(building["risk_class"]), results.texts), 12)
+        words = f"{position + 1}  {name}, {severity}, {place}"
         text = figure.text(left, row, literal(words), fontsize=8)
         _fit(text, 0.42 * figure.bbox.width)

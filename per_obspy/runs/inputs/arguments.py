@@ -1,5 +1,7 @@
 """Settings of a run from the arguments of a command: a configuration, or records and pairs."""
 
+import logging
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +18,8 @@ from per_obspy.runs.inputs.input_kinds import (
     kind_of,
     records_place,
 )
+
+log = logging.getLogger(__name__)
 
 #: Folder of the shell in which results are written where no other is named.
 RESULTS = Path("results")
@@ -218,12 +222,37 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
         return {"records": {"asdf": {"file": str(place)}}}
     if path.is_file():
         return {"records": {"folder": str(path)}}
-    # Files with the records that describe the earthquake
-    found = {"folder": str(path)}
-    for beside, key in {Kind.EVENT: "event", **_MOTIONS}.items():
-        files = [file for file, one in files_in(path).items() if one is beside]
-        found |= {key: str(files[0])} if len(files) == 1 else {}
-    return {"records": found}
+    return {"records": _folder_content(path)}
+
+
+def _folder_content(path: Path) -> dict[str, str]:
+    """Return the keys of a folder of records, and of files in it that describe the earthquake."""
+    found, beside = dict[str, str](), defaultdict[str, list[Path]](list)
+    kinds = files_in(path)
+    for file, one in kinds.items():
+        if key := _beside_records(file, one):
+            beside[key].append(file)
+    for key, files in beside.items():
+        if len(files) == 1:
+            found[key] = str(files[0])
+        elif key != "event":  # records show theirs
+            names = ", ".join(file.name for file in files)
+            log.warning("%s: none of %s is used: name one in records.%s", path, names, key)
+    if "shakemap" not in found:
+        found.pop("shakemap_uncertainty", None)
+    # A motion without any record is all there is
+    is_alone = Kind.RECORDS not in kinds.values() and not any(map(Path.is_dir, path.iterdir()))
+    if not (is_alone and found.keys() & {*_MOTIONS.values()}):
+        found["folder"] = str(path)
+    return found
+
+
+def _beside_records(file: Path, kind: Kind) -> str | None:
+    """Return the key of the records for a file among them that describes the earthquake."""
+    # Both files of a ShakeMap are grids
+    if kind is Kind.SHAKEMAP and "uncertainty" in file.name.lower():
+        return "shakemap_uncertainty"
+    return {Kind.EVENT: "event", **_MOTIONS}.get(kind)
 
 
 def _fdsn_content(identifier: str, cache: Path) -> dict[str, Any]:

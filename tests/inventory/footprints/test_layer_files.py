@@ -132,7 +132,26 @@ def test_a_box_keeps_the_buildings_that_touch_it(tmp_path):
     assert raw.attributes["id"].to_pylist() == np.array(town.names)[inside].tolist()
     whole = read_raw_layer(path, None, (-180.0, -90.0, 180.0, 90.0))
     assert whole.attributes.equals(read_raw_layer(path, None).attributes)
-    assert len(read_raw_layer(path, None, (0.0, 0.0, 1e-3, 1e-3)).wkb) == 0
+    with pytest.raises(CatalogError, match=r"no building touches the box 0\.0,0\.0,0\.001"):
+        read_raw_layer(path, None, (0.0, 0.0, 1e-3, 1e-3))
+
+
+@pytest.mark.parametrize("unknown", [None, {"xmin": None, "xmax": None}])
+def test_a_building_of_unknown_box_is_kept(tmp_path, unknown):
+    # would catch neighbours that are lost without a word
+    town = small_town()
+    path = overture(tmp_path, town)
+    table = pa.parquet.read_table(path)
+    at, field = table.column_names.index("bbox"), table.schema.field("bbox")
+    boxes = [unknown and {**unknown, "ymin": -90.0, "ymax": 90.0}, *table["bbox"].to_pylist()[1:]]
+    pa.parquet.write_table(table.set_column(at, field, pa.array(boxes, field.type)), path)
+    raw = read_raw_layer(path, None, tuple(shapely.bounds(town.outlines[1])))
+    assert town.names[0] in raw.attributes["id"].to_pylist()
+    # Text is no box
+    texts = pa.array([{"xmin": "1", "xmax": "2", "ymin": "3", "ymax": "4"}] * len(boxes))
+    pa.parquet.write_table(table.set_column(at, "bbox", texts), path)
+    with pytest.raises(CatalogError, match="a box needs a column bbox with numbers"):
+        read_raw_layer(path, None, (-180.0, -90.0, 180.0, 90.0))
 
 
 def test_a_box_needs_degrees_and_a_column_of_boxes(tmp_path):

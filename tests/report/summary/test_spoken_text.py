@@ -14,7 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from per_obspy.report.results import Region, Results
-from per_obspy.report.statements import event_sentences
+from per_obspy.report.statements import alert, event_sentences
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
 from per_obspy.report.tally import PairTally
@@ -152,6 +152,26 @@ def test_the_page_is_one_and_no_text_leaves_it(page_text, monkeypatch, names, bu
     drawn = " ".join(text.get_text() for text in texts)
     assert "SIMULATED" in drawn
     assert ("The worst buildings" in drawn) == buildings
+
+
+def test_a_level_of_few_pairs_is_a_least_one_or_unknown():
+    # "at least none" would be read as none where most pairs have no verdict
+    facts = make_facts()
+    assert alert(facts).level == "Level: severe"
+    few = replace(facts, coverage=Coverage(100, 16, {"no station within reach": 84}))
+    assert alert(few).level == "Level: at least severe"
+    few.tally.expected_by_class["severe"] = 0.0
+    assert alert(few).level == "Level: unknown"
+    assert alert(replace(few, coverage=COVERAGE)).level == "Level: none"
+
+
+def test_a_page_in_spanish_has_no_english_class_and_no_decimal_point(page_text, monkeypatch):
+    facts = make_facts(buildings=True)
+    listed = facts.listed.assign(demand=[0.123, float("nan")])
+    figure, _ = page_text(replace(facts, language="es", listed=listed), monkeypatch)
+    drawn = [text.get_text() for text in figure.texts]
+    assert {"12,3 cm", "sin dato"} <= {*drawn}
+    assert any("1  P1, severa, " in text for text in drawn)
 
 
 def test_many_classes_and_reasons_stay_on_the_sheet(page_text, monkeypatch):

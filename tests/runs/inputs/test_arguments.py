@@ -56,7 +56,7 @@ def test_changes_go_into_the_settings(desk):
     assert settings.pairs.simulated.count == 7
 
 
-def test_what_lies_beside_the_records_is_used(desk):
+def test_what_lies_beside_the_records_is_used(desk, caplog):
     (desk / "records" / "event.xml").write_text("<q:quakeml>")
     (desk / "records" / "grid.xml").write_text("<shakemap_grid>")
     (desk / "records" / "list.json").write_text('{"commType": "FeatureCollection"}')
@@ -66,6 +66,21 @@ def test_what_lies_beside_the_records_is_used(desk):
     # of two earthquakes none is chosen
     (desk / "records" / "other.xml").write_text("<q:quakeml>")
     assert requested_run("records", "pairs.csv").configuration.records.event is None
+    # nor of two maps, which is said; the uncertainty of a map is no second one
+    (desk / "records" / "uncertainty.xml").write_text("<shakemap_grid>")
+    found = requested_run("records", "pairs.csv").configuration.records
+    names = (found.shakemap.name, found.shakemap_uncertainty.name)
+    assert (names, caplog.text) == (("grid.xml", "uncertainty.xml"), "")
+    (desk / "records" / "list2.json").write_text('{"commType": "FeatureCollection"}')
+    assert requested_run("records", "pairs.csv").configuration.records.stationlist is None
+    assert "none of list.json, list2.json is used: name one in records.stationlist" in caplog.text
+
+
+def test_a_folder_of_a_map_or_a_list_alone_needs_no_record(desk):
+    (desk / "map").mkdir()
+    (desk / "map" / "stationlist.json").write_text('{"commType": "FeatureCollection"}')
+    found = requested_run("map", "pairs.csv").configuration.records
+    assert (found.folder, found.stationlist) == (None, desk / "map" / "stationlist.json")
 
 
 def test_other_sources_of_motion(desk):
