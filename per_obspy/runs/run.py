@@ -79,7 +79,6 @@ def run(
     asked = RunSettings(configuration, output)
     folder = asked.folder
     with locked_folder(folder):
-        asked.write()
         fetched = fetched or _fetched_records(asked.settings, progress)
         asked.use_fetched_map()
         # Inputs are hashed here only to compare them with those of a finished run
@@ -87,6 +86,7 @@ def run(
         if (folder / RECORD).is_file():
             head = asked.head(fetched, {})
             if known := _earlier_run(folder, head["key"]):
+                asked.write()
                 return Result(folder, known, did_nothing=True)
 
         _prepare_workers(asked.settings, executor)

@@ -73,6 +73,8 @@ def new_run(
     # Pairs from footprints, and everything that would stop a later stage
     drawn = write_drawn_pairs(settings, folder, context.progress)
     check_inputs(settings, folder)
+    # A refused configuration leaves that of the results in its place
+    asked.write()
     record = RunRecord(name=settings.name, facts=facts, drawn=drawn).begin(folder, STATIONS)
     with timed(record.seconds, "records"):
         found = find_station_tasks(context, fetched)

@@ -21,7 +21,7 @@ from filelock import FileLock
 from pyarrow import parquet
 
 from per_obspy.config import Processing
-from per_obspy.errors import FolderInUse
+from per_obspy.errors import CatalogError, FolderInUse
 from per_obspy.results.table_files import rounded_table
 from per_obspy.runs.output_folder import Result
 from per_obspy.runs.process import process_records
@@ -247,6 +247,16 @@ def test_a_damaged_result_is_made_again(copied):
     assert not result.did_nothing
     assert (copied / "out" / "risk.csv").read_bytes() == before
     assert result.record["counts"]["stations_resumed"] == 3
+
+
+def test_a_refused_configuration_leaves_that_of_the_results(copied):
+    # `report` and `screen` read it: a mistake of a later day would be theirs
+    before = (copied / "out" / "configuration.toml").read_bytes()
+    text = (copied / "run.toml").read_text() + '\n[report]\nbackground = "absent.pmtiles"\n'
+    (copied / "run.toml").write_text(text)
+    with pytest.raises(CatalogError, match="absent.pmtiles"):
+        run(copied / "run.toml", executor=InProcess())
+    assert (copied / "out" / "configuration.toml").read_bytes() == before
 
 
 def test_results_do_not_depend_on_the_day(copied):
