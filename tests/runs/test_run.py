@@ -254,7 +254,7 @@ def test_a_refused_configuration_leaves_that_of_the_results(copied):
     before = (copied / "out" / "configuration.toml").read_bytes()
     text = (copied / "run.toml").read_text() + '\n[report]\nbackground = "absent.pmtiles"\n'
     (copied / "run.toml").write_text(text)
-    with pytest.raises(CatalogError, match="absent.pmtiles"):
+    with pytest.raises(CatalogError, match=r"absent\.pmtiles"):
         run(copied / "run.toml", executor=InProcess())
     assert (copied / "out" / "configuration.toml").read_bytes() == before
 
