@@ -212,7 +212,7 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
             hit = chance_text(number(pair, "probability"))
             lines.append(NO_IMPACT.format(hit=hit))
     if math.isfinite(growth := number(pair, "expected_amplification")):
-        lines.append(f"Motion with pounding over motion without: {growth:.2f}.")
+        lines.append(f"Motion with pounding over motion without: {growth:.2g}.")
     return lines
 
 
