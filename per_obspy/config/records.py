@@ -42,7 +42,7 @@ class Columns(Section):
     channels: dict[str, Annotated[int, Field(ge=0, le=10_000)]] = Field(
         description="column of each channel, counted from 0: channel code = column"
     )
-    azimuths: dict[str, Annotated[float, Field(ge=-360, le=360)]] = Field(
+    azimuths: dict[str, Annotated[float, Field(ge=-720, le=720)]] = Field(
         default_factory=dict,
         description="azimuth of each channel, degrees clockwise from north: channel code = azimuth",
     )

@@ -37,7 +37,7 @@ def test_every_key_of_every_configuration_has_a_line_with_help(generated):
         if name not in everything and f"{name}]" not in text
     ]
     assert missing == []
-    assert "`largest_distance` | `20000.0` | m | > 0 |" in text
+    assert "`largest_distance` | `20000.0` | m | > 0, ≤ 2e+07 |" in text
 
 
 def test_every_key_that_is_no_table_has_help():

@@ -12,7 +12,7 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.footprints.building_columns import schema_columns
 from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs, write_buildings
 from per_obspy.inventory.footprints.sources import ORIGINS, outline_origins, source_of
-from per_obspy.report.statements import search_sentence
+from per_obspy.report.coverage import search_sentence
 from per_obspy.results.coverage import search_of_table
 
 #: A square of 10 m at the equator, in degrees, and its way to the next one with a gap of 0.5 m.
