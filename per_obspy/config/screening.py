@@ -1,6 +1,6 @@
 """Assumptions about buildings, and settings of the motion, states and classes of pairs."""
 
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     Field,
@@ -8,11 +8,8 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.section import Language, RelativePath, Section
+from per_obspy.config.section import Language, RelativePath, Section, SectionType
 from per_obspy.constants import LANGUAGES
-
-#: Any kind of settings.
-SectionType = TypeVar("SectionType", bound=Section)
 
 #: Largest offset of two floors that still hit floor to floor, m: 2 ft in FEMA P-154.
 FLOOR_TOLERANCE = 0.61

@@ -26,6 +26,7 @@ from per_obspy.pounding.linearization import NARROW, record_bandwidth
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.flags import period_is_derived
+from per_obspy.screening.population import LARGEST_DAMPING
 from per_obspy.screening.station_motion import (
     LogSpectra,
     PairMotion,
@@ -174,10 +175,6 @@ def single_hit_columns(table: Table, radii: Both, periods: Both) -> Columns:
 #: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
 PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
-
-#: Largest damping that yielding takes a building to, fraction of critical: an oscillator has less
-#: than the critical damping.
-LARGEST_DAMPING = 0.99
 
 #: Properties that the equivalent linear building does not share with the given one.
 EQUIVALENT = ("period", "damping", "per")

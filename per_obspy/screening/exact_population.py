@@ -31,6 +31,7 @@ from scipy.special import ndtri
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.kernels.pairs.node_outcomes import QUANTILE
+from per_obspy.screening.estimates import ROUND_OFF
 from per_obspy.screening.exact import (
     can_yield,
     exact_approach,
@@ -96,9 +97,6 @@ NEAR = 1.3
 #: Probability by the estimate up to which pairs of derived periods are not driven by the record;
 #: those as near to 1 surely touch.
 NEGLIGIBLE = 1e-4
-
-#: Demand / sum of the radii below which two oscillators move as one.
-ROUND_OFF = 1e-12
 
 #: Exact impact velocity at the medians / that of ``population.py``: limits of plausible ratios.
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5

@@ -85,7 +85,8 @@ TOUCHING, CLOSE, APART, WIDE = (0.1, 0.9), (0.01, 0.9), (0.16, 0.84), 3.0
 #: contact at half of the pairs drawn apart, near or far, so that those stay even.
 ONE_WALL = 0.85
 
-#: Largest damping of a node, fraction of critical: an oscillator has less than the critical one.
+#: Largest damping of a node, and of a building that yields, fraction of critical: an oscillator has
+#: less than the critical one.
 LARGEST_DAMPING = 0.99
 
 
