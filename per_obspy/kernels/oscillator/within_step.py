@@ -400,8 +400,8 @@ def raise_to_root(number, ends, rates, damping, phase, terms, work, best):
     """
     Raise the largest values to the one at the root of a condition in a short step.
 
-    ``ends``: u, z and the acceleration before and after the step. Returns whether it is certain
-    that there is no other root.
+    ``ends``: u, z and the acceleration before and after the step. Returns whether the root is
+    found, and it is certain that there is no other.
     """
     # Value and slope of the condition at both ends
     rate = (ends[5] - ends[2]) / phase
@@ -424,6 +424,8 @@ def raise_to_root(number, ends, rates, damping, phase, terms, work, best):
         if abs(shift) <= min(SMALL_SHIFT, SMALL_PART * phase):
             break
         root = min(max(root + shift, 0.0), phase)
+    else:
+        return False
     # Value at the root, to second order in the last shift; (r²)' = -2 z (2 xi z + a)
     half = 0.5 * shift * value
     if number == 0:

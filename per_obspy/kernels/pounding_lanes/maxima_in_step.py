@@ -231,10 +231,14 @@ def turning_point(pair, row, i, start, end, change, share):
         # state at the estimate, and Newton's step with curvature from there
         u, z, y = state_inside_step(pair, row, i, start, change, time)
         rate = acceleration_rate(pair, first, (u, z, y), change)
-        step = -z / (angle * y)
-        step -= 0.5 * step * step * rate / y
+        first_order = -z / (angle * y)
+        step = first_order - 0.5 * first_order * first_order * rate / y
         time += step
-        if abs(step) <= NEAR:
+        # the series holds inside the piece only
+        if not 0.0 <= time <= share:
+            break
+        # both terms: where the acceleration vanishes they may cancel far from a root
+        if max(abs(first_order), abs(step)) <= NEAR:
             return u + angle * step * (z + angle * step * (0.5 * y + SIXTH * step * rate))
     return math.nan
 

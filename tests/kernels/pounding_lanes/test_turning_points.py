@@ -83,3 +83,31 @@ def test_a_motion_that_turns_twice_is_uncertain():
     inside = [state_inside_step(pair, row, 0, start, change, s) for s in INSIDE]
     assert np.count_nonzero(np.diff(np.sign([z for _, z, _ in inside]))) == 2
     assert math.isnan(turning_point(pair, row, 0, start, inside[-1], change, 1.0))
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_a_turn_where_the_acceleration_vanishes_is_inside_the_step(damping):
+    # catches: Newton's step out of the step, where the series grows without bound
+    pair, row = pair_of(damping)
+    random = np.random.default_rng(5)
+    found = 0
+    for case in range(2000):
+        i = case % 2
+        first = i * lanes.STRUCTURE_ROWS
+        # velocity and acceleration both vanish near the end of the step
+        rest = complete_state(pair, first, random.normal(), 0.0, 0.0)
+        share = random.uniform(0.9, 1.1)
+        change = -rest[2] / (pair[first + lanes.ACCELERATION + 2] * share)
+        late = 10.0 ** random.uniform(-5.0, -1.0)
+        start = (
+            rest[0],
+            -0.5 * (1.0 - late) * share * pair[first + lanes.ANGLE] * rest[2],
+            rest[2],
+        )
+        end = state_inside_step(pair, row, i, start, change, 1.0)
+        turn = turning_point(pair, row, i, start, end, change, 1.0)
+        if not math.isnan(turn) and turn != start[0]:
+            found += 1
+            expected = located(pair, row, i, start, change, 1.0)
+            assert_allclose(turn, expected, rtol=1e-14, atol=1e-15)  # rounding
+    assert found > 100
