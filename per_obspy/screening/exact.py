@@ -20,6 +20,7 @@ from per_obspy.pounding.relative import (
     Approach,
     approach,
     directional_relative_displacement,
+    yielding_approach,
     yielding_relative_displacement,
 )
 from per_obspy.screening.flags import period_is_derived
@@ -141,9 +142,21 @@ def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> F
 
 
 def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) -> Approach:
-    """Return the largest relative motion of linear buildings without contact, 1 towards 2."""
-    relative: Approach = approach(*station.components, *_arguments(table, azimuth))
-    return relative
+    """
+    Return the largest relative motion of buildings without contact, 1 towards 2.
+
+    For the nodes of a population: that of buildings that yield is not exact.
+    """
+    relative, yields = np.empty((2, azimuth.size)), can_yield(table)
+    if not yields.all():
+        arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
+        relative[:, ~yields] = approach(*station.components, *arguments)
+    if yields.any():
+        pairs = chosen(table, yields)
+        record = np.stack([station.north, station.east]), station.dt
+        arguments = _arguments(pairs, azimuth[yields])
+        relative[:, yields] = yielding_approach(*record, *arguments, **_strengths(pairs))
+    return Approach(*relative)
 
 
 def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -> PoundingMaxima:
