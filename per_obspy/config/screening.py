@@ -77,10 +77,10 @@ class Building(Section):
         description="largest difference of floor levels that count as aligned, m; 2 ft: FEMA P-154",
     )
     strength: Literal["none", "hazus"] = Field(
-        "none",
+        "hazus",
         description=(
-            "strength of buildings without a yield value: none (they stay linear) or hazus (yield "
-            "and ultimate capacity by system, storeys and code_level); slower"
+            "strength of buildings without a yield value: hazus (yield and ultimate capacity by "
+            "system, storeys and code_level, where they are known) or none (they stay linear)"
         ),
     )
     code_level: Literal["low", "moderate", "high"] = Field(

@@ -12,6 +12,8 @@ from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.lanes import APART, LANE_ROWS_WITHOUT_CONTACT
 from per_obspy.kernels.pounding_lanes.run_block import UNREACHABLE, run_block
 from per_obspy.kernels.relative.relative_maxima import relative_maxima
+from per_obspy.kernels.relative.yielding_approach import CHECKED_STEPS
+from per_obspy.kernels.relative.yielding_approach import yielding_approach as fill_approach
 from per_obspy.pounding.kernel_tables import (
     both_components,
     closed_record,
@@ -24,6 +26,10 @@ from per_obspy.spectra.trace_arguments import takes_trace
 #: Largest remainder of a motion that is not computed, over 0.4 % of its bound: of critical gaps a
 #: thousandth of the promised exactness; of the approach, of which populations need hundreds, more.
 FORGOTTEN, FORGOTTEN_OF_APPROACH = 1e-12, 1e-7
+
+#: Largest angle of a step of pairs that yield, rad, at which peaks between steps are missed by 1.5
+#: % at most; longest free vibration after the record, s.
+LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
 
 
 class RelativeDisplacement(NamedTuple):
@@ -44,9 +50,9 @@ class Approach(NamedTuple):
     """
     Largest relative motion of two structures at contact level without contact, 1 towards 2.
 
-    ``displacement`` is the largest ``q1 u1 - q2 u2``, m, exact to 1e-6; ``velocity`` the largest
-    ``q1 v1 - q2 v2`` at the samples, m/s, which misses at most ``1 - cos(pi dt / T)`` of a
-    vibration of the period T.
+    ``displacement`` is the largest ``q1 u1 - q2 u2``, m, exact to 1e-6 for linear structures;
+    ``velocity`` the largest ``q1 v1 - q2 v2`` at the samples, m/s, which misses at most ``1 -
+    cos(pi dt / T)`` of a vibration of the period T.
     """
 
     displacement: FloatArray
@@ -216,6 +222,85 @@ def approach(
         north, east, dt, pairs, FORGOTTEN_OF_APPROACH, both_sides=False
     )
     return Approach(displacement, velocity)
+
+
+def yielding_approach(
+    acceleration: ArrayLike,
+    dt: float,
+    period_1: ArrayLike,
+    damping_1: ArrayLike,
+    period_2: ArrayLike,
+    damping_2: ArrayLike,
+    azimuth: ArrayLike,
+    participation_1: ArrayLike = 1.0,
+    participation_2: ArrayLike = 1.0,
+    yield_displacement_1: ArrayLike = math.inf,
+    hardening_1: ArrayLike = 0.0,
+    yield_displacement_2: ArrayLike = math.inf,
+    hardening_2: ArrayLike = 0.0,
+) -> Approach:
+    """
+    Compute by how far and how fast structure 1 approaches 2 at most, if they do not touch.
+
+    For populations of structures that yield: the same as `yielding_relative_displacement`, at the
+    samples and steps between them of 0.35 rad of the shorter period at most, in an eighth of its
+    time. Half of the displacements are exact to 2e-4, 99 % to 0.5 %.
+
+    Parameters
+    ----------
+    acceleration, dt, period_1, damping_1, period_2, damping_2, azimuth : array_like
+        See `yielding_relative_displacement`.
+    participation_1, participation_2, yield_displacement_1, yield_displacement_2 : array_like
+        Likewise.
+    hardening_1, hardening_2 : array_like
+        Likewise.
+
+    Returns
+    -------
+    Approach
+        Arrays of the broadcast shape of the pairs, m and m/s.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+    pairs = Pairs.of(
+        period_1=period_1,
+        damping_1=damping_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        azimuth=azimuth,
+        participation_1=participation_1,
+        participation_2=participation_2,
+        yield_displacement_1=yield_displacement_1,
+        hardening_1=hardening_1,
+        yield_displacement_2=yield_displacement_2,
+        hardening_2=hardening_2,
+    )
+    step, record = (
+        checks.number("dt", dt, checks.positive),
+        closed_record(ground_motion(acceleration)),
+    )
+    # zeros after the record, up to a whole number of rounds
+    shaken = record.shape[1] - 1
+    rounds = -(-(shaken + int(FREE_VIBRATION / step)) // CHECKED_STEPS)
+    samples = np.arange(rounds * CHECKED_STEPS + 1)
+    # structures in the order of the kernel
+    angle, fields = np.radians(pairs.azimuth), (pairs.frequency, pairs.damping, pairs.participation)
+    numbers = np.stack([*fields, pairs.yield_displacement, pairs.hardening], axis=1)
+    numbers = np.concatenate([numbers.reshape(10, -1), [np.cos(angle), np.sin(angle)]])
+    # each pair with its steps per sampling interval
+    largest = np.empty((2, angle.size))
+    parts = np.ceil(pairs.frequency.max(axis=0, initial=0.0) * step / LARGEST_ANGLE).astype(int)
+    for number in np.unique(parts).tolist():
+        times = np.arange(samples[-1] * number + 1) / number
+        motion = (np.interp(times, samples[: shaken + 1], one, right=0.0) for one in record)
+        own = np.empty((2, np.count_nonzero(parts == number)))
+        chosen = np.ascontiguousarray(numbers[:, parts == number])
+        fill_approach(*motion, step / number, shaken * number, chosen, own)
+        largest[:, parts == number] = own
+    return Approach(*largest.reshape(2, *pairs.shape))
 
 
 def _maxima(

@@ -29,6 +29,7 @@ NO_LEVEL = "#5C5C5C"
 
 #: Flags that are counted, with the keys of their sentences.
 DOUBTS = {
+    "assumed_strength": "sure_assumed_strength",
     "beyond_elastic": "sure_beyond_elastic",
     "derived_inputs": "sure_derived",
     "outside_usable_periods": "sure_periods",

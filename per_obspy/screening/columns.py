@@ -240,8 +240,9 @@ RESULTS: dict[str, Column] = {
         *_per_building(
             "elastic_ratio",
             "1",
-            "elastic displacement / yield displacement by HAZUS; above 1 the building would yield, "
-            "which is not modelled; empty where its system is unknown or a yield value is given",
+            "elastic displacement / yield displacement by HAZUS; above 1 the building yields (flag "
+            "assumed_strength), or would yield, which is not modelled (flag beyond_elastic); empty "
+            "where its system is unknown or a yield value is given",
         ),
         _number("missing_gap", "m", "demand minus gap; 0 where the gap is enough"),
         _number(

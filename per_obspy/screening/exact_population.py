@@ -33,9 +33,7 @@ from per_obspy.config import Screening
 from per_obspy.kernels.pairs.node_outcomes import QUANTILE
 from per_obspy.screening.estimates import ROUND_OFF
 from per_obspy.screening.exact import (
-    can_yield,
     exact_approach,
-    exact_demand,
     record_supports,
 )
 from per_obspy.screening.population import (
@@ -78,10 +76,9 @@ from per_obspy.screening.values import (
     values,
 )
 
-#: First nodes, which suffice for pairs that touch, for those in which a building can yield, whose
-#: demand takes fifty times as long, and where their probability is this near to 0 or 1, with a
-#: margin. Of 16 nodes the deviation of periods is 7 % too small and that of dampings 13 % too
-#: large, of 32 both are right to 3 %.
+#: First nodes, which suffice for pairs that touch and where their probability is this near to 0 or
+#: 1, with a margin. Of 16 nodes the deviation of periods is 7 % too small and that of dampings 13 %
+#: too large, of 32 both are right to 3 %.
 FIRST_NODES, CERTAIN = 32, 1e-3
 
 #: Gap over the largest demand, and smallest demand over the gap, of nodes that leave no doubt. Of
@@ -166,12 +163,11 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     uncertain = building_is_uncertain(table)
     # drawn outlines that touch may still have a gap
     touching = (values(table, "gap") == 0.0) & (gap_dispersion(table) == 0.0)
-    first_suffice = touching | can_yield(table)
     # exact demands in blocks, which bound the memory; a pair does not depend on its block
     for mask, outcome in (
         (~uncertain, _of_certain_buildings),
-        (uncertain & first_suffice, partial(_sampled, count=FIRST_NODES)),
-        (uncertain & ~first_suffice, partial(_sampled, count=len(NODES))),
+        (uncertain & touching, partial(_sampled, count=FIRST_NODES)),
+        (uncertain & ~touching, partial(_sampled, count=len(NODES))),
     ):
         for rows in _blocks(by_record & mask):
             _fill(result, rows, outcome(_block(station, chosen(table, rows), screening)))
@@ -247,7 +243,7 @@ def _sampled(block: _Block, count: int) -> Columns:
 
 def _of_nodes(block: _Block, motion: RelativeMotion, nodes: FloatArray) -> Columns:
     """Return the population of uncertain buildings, with a probability that the nodes can show."""
-    uncertain = Uncertain(motion, block.site.log_std, _factor_of_yielding(block))
+    uncertain = Uncertain(motion, block.site.log_std, np.ones(len(motion.demand)))
     outcome = population(uncertain, block.table, nodes)
     lowest, highest = resolved_probability(motion.demand, median_gap(block.table))
     return outcome | {"probability": np.clip(outcome["probability"], lowest, highest)}
@@ -286,31 +282,15 @@ def resolved_probability(demands: FloatArray, gap: FloatArray) -> Both:
 
 def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
     sample = _sampled_buildings(block.table, nodes)
-    demand, velocity = _in_record(block, sample, len(nodes))
+    shape = -1, len(nodes)
+    demand, velocity = exact_approach(block.station, sample, sample["azimuth_used"])
+    demand, velocity = demand.reshape(shape), velocity.reshape(shape)
     # equal motions leave the round-off of their difference
     moves_apart = demand > ROUND_OFF * values(block.table, "absolute_gap")[:, None]
     demand = np.where(moves_apart, demand, 0.0)
     # expected motion between the stations of the same buildings
     ln_field = ln_field_demand(block.station, sample).reshape(demand.shape)
     return _at_site(block, nodes, demand, velocity, ln_field)
-
-
-def _in_record(block: _Block, sample: Columns, count: int) -> Both:
-    """Return demand and relative velocity in the record, of a number of nodes per pair."""
-    yields = can_yield(sample)
-    demand, velocity = _linear_approach(block.station, sample)
-    weak = chosen(sample, yields)
-    demand[yields] = exact_demand(block.station, weak, values(weak, "azimuth_used"))
-    return demand.reshape(-1, count), velocity.reshape(-1, count)
-
-
-def _linear_approach(station: StationMotion, table: Table) -> Both:
-    """Return demand and relative velocity in the record; NaN where a building can yield."""
-    demand, velocity = np.full((2, len(table["gap"])), np.nan)
-    linear = ~can_yield(table)
-    pairs = chosen(table, linear)
-    demand[linear], velocity[linear] = exact_approach(station, pairs, values(pairs, "azimuth_used"))
-    return demand, velocity
 
 
 def _at_site(
@@ -320,13 +300,8 @@ def _at_site(
     estimate = estimated_motion(block.motion, block.station.per, block.table, nodes)
     weight, ln_ratio = block.site.weight[:, None], block.site.ln_ratio[:, None]
     at_site = median_at_site(demand, weight, ln_ratio, ln_field)
-    # frequency of the relative motion: that of the record, of a building that yields that of the
-    # estimate, or one between both buildings' where that has none
-    period_1, period_2 = both(block.table, "period")
-    frequency = np.repeat(2.0 * np.pi / np.sqrt(period_1 * period_2)[:, None], len(nodes), axis=1)
-    np.divide(estimate.velocity, estimate.demand, out=frequency, where=estimate.demand > 0.0)
-    known = np.isfinite(velocity) & (demand > 0.0)
-    np.divide(velocity, demand, out=frequency, where=known)
+    # the relative motion has the same frequency at both
+    frequency = np.divide(velocity, demand, out=np.zeros_like(demand), where=demand > 0.0)
     return estimate._replace(demand=at_site, velocity=frequency * at_site)
 
 
@@ -350,7 +325,8 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
 def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     """Return the motion at the medians, (n_pairs, 1), and the factor of impact velocities there."""
     site, exact = block.site, values(block.table, "demand_exact")
-    _, velocity = _linear_approach(block.station, block.table)
+    azimuth = values(block.table, "azimuth_used")
+    _, velocity = exact_approach(block.station, block.table, azimuth)
     columns = exact[:, None], velocity[:, None], site.ln_field[:, None]
     moving = _at_site(block, np.zeros((1, NODES.shape[1])), *columns)
     demand = moving.demand[:, 0]
@@ -363,11 +339,3 @@ def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     known = (velocity > 0.0) & (estimate > 0.0)
     factor = np.divide(velocity, estimate, out=np.ones_like(velocity), where=known)
     return moving, np.clip(factor, SMALLEST_FACTOR, LARGEST_FACTOR)
-
-
-def _factor_of_yielding(block: _Block) -> FloatArray:
-    """Return the factor at the medians where a building can yield, to which no fit applies."""
-    factor, yields = np.ones(block.motion.row.size), np.flatnonzero(can_yield(block.table))
-    if yields.size:
-        _, factor[yields] = _at_the_medians(block.rows(yields))
-    return factor

@@ -18,6 +18,7 @@ from per_obspy.screening.values import (
     both,
     number,
     oscillators,
+    strength_is_assumed,
     values,
 )
 from per_obspy.spectra.station import lacks_azimuths
@@ -59,11 +60,21 @@ def elastic_ratios(table: Table) -> dict[str, FloatArray]:
     NaN where the pair table gives a yield value, or the system is unknown.
     """
     ratios = {}
-    for i in (1, 2):
+    for i, is_assumed in enumerate(strength_is_assumed(table), start=1):
         ratio = values(table, f"sd_{i}") / values(table, f"hazus_yield_{i}")
-        is_linear = np.isinf(values(table, f"yield_displacement_{i}"))
-        ratios[f"elastic_ratio_{i}"] = np.where(is_linear, ratio, np.nan)
+        not_given = is_assumed | np.isinf(values(table, f"yield_displacement_{i}"))
+        ratios[f"elastic_ratio_{i}"] = np.where(not_given, ratio, np.nan)
     return ratios
+
+
+def _beyond_elastic(table: Table) -> dict[str, BoolArray]:
+    """Return a mask of pairs with a building beyond HAZUS' yield, in the model or not."""
+    ratios = np.stack(both(table, "elastic_ratio"))
+    is_linear = np.isinf(np.stack(both(table, "yield_displacement")))
+    return {
+        "beyond_elastic": np.asarray(((ratios > 1.0) & is_linear).any(axis=0)),
+        "assumed_strength": np.asarray(((ratios > 1.0) & ~is_linear).any(axis=0)),
+    }
 
 
 def joined_flags(raised: Mapping[str, BoolArray]) -> TextArray:
@@ -86,7 +97,7 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "touching": gap == 0.0,
         "learned_outlines": outlines_are_learned(table),
         "raster_height": heights_are_from_raster(table),
-        "beyond_elastic": np.fmax(*both(table, "elastic_ratio")) > 1.0,
+        **_beyond_elastic(table),
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": is_derived,

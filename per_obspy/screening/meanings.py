@@ -55,6 +55,10 @@ FLAGS: dict[str, str] = {
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"
     ),
+    "assumed_strength": (
+        "a building yields by an assumed strength: that of HAZUS for its system, storeys and the "
+        "assumed code level; no such strength alone makes a no"
+    ),
     "beyond_elastic": (
         "a building would yield, which is not modelled: its elastic displacement is elastic_ratio "
         "times the yield displacement of HAZUS for its system, storeys and assumed code level"

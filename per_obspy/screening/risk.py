@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 from pandas.api.types import is_numeric_dtype
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import check_columns
@@ -50,7 +51,16 @@ from per_obspy.screening.station_motion import (
     motion_of_one_horizontal,
     station_motion,
 )
-from per_obspy.screening.values import Columns, IndexArray, at_contact, chosen, joined, values
+from per_obspy.screening.values import (
+    Columns,
+    IndexArray,
+    at_contact,
+    chosen,
+    joined,
+    stay_linear,
+    strength_is_assumed,
+    values,
+)
 from per_obspy.spectra.station import lacks_azimuths
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -186,8 +196,27 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     table |= mitigation_columns(station, table, screening.target_amplification)
     raised = raised_by_record(table, dataset, screening)
     table |= record_population(station, table, screening)
+    table["probability"] = _not_less_by_assumption(dataset, given, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in given}
+
+
+def _not_less_by_assumption(
+    dataset: xr.Dataset, pairs: Columns, table: Columns, screening: Screening
+) -> FloatArray:
+    """
+    Return the probability of contact, above a ``no`` where only an assumed strength makes it one.
+
+    It is that of linear buildings there, up to the smallest of the next state.
+    """
+    probability, smallest = values(table, "probability").copy(), screening.states.unlikely
+    is_assumed = np.any(strength_is_assumed(pairs), axis=0)
+    rows = np.flatnonzero(is_assumed & (probability < smallest))
+    if rows.size:
+        block = chosen(pairs, rows)
+        linear = _record_columns(dataset, block | stay_linear(block), screening)["probability"]
+        probability[rows] = np.maximum(probability[rows], np.minimum(linear, smallest))
+    return probability
 
 
 def _motions(

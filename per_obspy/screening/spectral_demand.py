@@ -28,7 +28,15 @@ from per_obspy.screening.population import (
 from per_obspy.screening.ranking import state_columns
 from per_obspy.screening.station_motion import LogSpectra
 from per_obspy.screening.uncertain_motion import likely_oscillators, pair_motion
-from per_obspy.screening.values import Both, Columns, IndexArray, both, pair_correlation, values
+from per_obspy.screening.values import (
+    Both,
+    Columns,
+    IndexArray,
+    both,
+    pair_correlation,
+    stay_linear,
+    values,
+)
 
 
 class SpectralMotion(NamedTuple):
@@ -49,6 +57,8 @@ def spectral_rows(
     Radii are at contact height, m. A pair with derived periods has at least the root of the sum of
     squares as its demand; ``squares_decide`` is true where that is larger.
     """
+    # a spectrum says nothing of buildings that yield
+    pairs = pairs.assign(**stay_linear(pairs))
     radii, periods = spectral_radii(pairs, motion), both(pairs, "period")
     # eq. (15) with the correlation of eq. (16), and without correlation
     correlation = pair_correlation(pairs)

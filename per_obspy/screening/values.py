@@ -93,6 +93,26 @@ def at_contact(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     return participation_1 * length_1, participation_2 * length_2
 
 
+def strength_is_assumed(table: Table) -> tuple[BoolArray, BoolArray]:
+    """Return masks of buildings 1 and 2 with the yield displacement of HAZUS, which none gave."""
+    first, second = (
+        values(table, f"yield_displacement_{i}") == values(table, f"hazus_yield_{i}")
+        for i in (1, 2)
+    )
+    return first, second
+
+
+def stay_linear(table: Table) -> Columns:
+    """Return the columns by which buildings of an assumed strength do not yield."""
+    columns: Columns = {}
+    for i, is_assumed in enumerate(strength_is_assumed(table), start=1):
+        linear = {"yield_displacement": np.inf, "yield_log_std": 0.0, "hardening": 0.0}
+        for name, value in linear.items():
+            column = f"{name}_{i}"
+            columns[column] = np.where(is_assumed, value, values(table, column))
+    return columns
+
+
 def number(station: xr.Dataset, name: str) -> float:
     """Return a scalar of a station."""
     return float(station[name].item())

@@ -108,8 +108,8 @@ def test_hazus_gives_a_strength_to_known_systems_without_one():
     rows = [{"system_1": "concrete_mrf"}, {"system_1": ""}, {"yield_coefficient_1": 0.2}]
     given = {"system_1": "concrete_mrf", "system_2": "", "storeys_1": 5.0, "period_1": 0.75}
     table = pd.DataFrame([PLACE | SIZES | given | row for row in rows])
-    linear = completed_pairs(table, Building())
-    complete = completed_pairs(table, Building(strength="hazus"))
+    linear = completed_pairs(table, Building(strength="none"))
+    complete = completed_pairs(table, Building())
     # HAZUS-MH, C1M, moderate code: 0.58 inches at 0.75 s, two digits each, the period squared
     assert linear["yield_displacement_1"].tolist()[:2] == [np.inf, np.inf]
     assert_allclose(complete["yield_displacement_1"][0], 0.58 * 0.0254, rtol=0.02)

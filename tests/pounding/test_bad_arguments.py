@@ -10,6 +10,7 @@ from per_obspy.pounding.correlation import directional_correlation, worst_azimut
 from per_obspy.pounding.relative import (
     approach,
     directional_relative_displacement,
+    yielding_approach,
     yielding_relative_displacement,
 )
 from per_obspy.pounding.structure import Structure
@@ -49,7 +50,7 @@ NAMES = """
 FUNCTIONS = [
     *(getattr(per_obspy, name) for name in NAMES.split()),
     directional_correlation, directional_relative_displacement, approach, worst_azimuth,
-    yielding_relative_displacement,
+    yielding_approach, yielding_relative_displacement,
 ]  # fmt: skip
 
 
@@ -63,7 +64,7 @@ def cases():
     for function in FUNCTIONS:
         names = [name for name in inspect.signature(function).parameters if name not in SWITCHES]
         good = {name: OTHERS.get(name) or numbers_of(name)[0] for name in names}
-        if function is yielding_relative_displacement:
+        if function in (yielding_approach, yielding_relative_displacement):
             good["acceleration"] = [RECORD, RECORD]
         elif function is per_obspy.pounding_histories:
             del good["azimuth"]

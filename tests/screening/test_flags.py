@@ -34,6 +34,8 @@ PLAIN = {
     "sd_2": [0.2, 0.2],
     "elastic_ratio_1": [np.nan, np.nan],
     "elastic_ratio_2": [1.0, 1.0],
+    "yield_displacement_1": [np.inf, np.inf],
+    "yield_displacement_2": [np.inf, np.inf],
     "other_site_class": [False, False],
     "linearized_converged": [True, True],
     "supplemental_damping": [0.0, 0.0],
@@ -88,21 +90,25 @@ def _raised(flags):
         # either building counts, whether the strength of the other is known or not
         ({"elastic_ratio_1": 1.01}, {"beyond_elastic"}),
         ({"elastic_ratio_2": 1.01}, {"beyond_elastic"}),
+        # by an assumed strength it yields; below it nothing is assumed of the results
+        ({"elastic_ratio_2": 1.01, "yield_displacement_2": 0.1}, {"assumed_strength"}),
+        ({"elastic_ratio_2": 0.99, "yield_displacement_2": 0.1}, set()),
+        ({"elastic_ratio_1": 1.01, "yield_displacement_2": 0.1}, {"beyond_elastic"}),
     ],
 )
 def test_flags_of_pairs(changes, flags):
     assert _raised(raised_by_pairs(_table(**changes))) == [set(), flags]
 
 
-def test_only_a_linear_building_of_known_strength_goes_beyond_it():
+def test_a_building_is_compared_with_a_strength_that_nobody_gave():
     pairs = {
-        "sd_1": [0.06, 0.06, 0.06],
-        "hazus_yield_1": [0.03, 0.03, np.nan],
-        "yield_displacement_1": [np.inf, 0.02, np.inf],
+        "sd_1": [0.06, 0.06, 0.06, 0.06],
+        "hazus_yield_1": [0.03, 0.03, 0.03, np.nan],
+        "yield_displacement_1": [np.inf, 0.03, 0.02, np.inf],
     }
     pairs |= {name.replace("_1", "_2"): column for name, column in pairs.items()}
-    # twice its yield displacement; modelled; of unknown system
-    assert_array_equal(elastic_ratios(pairs)["elastic_ratio_1"], [2.0, np.nan, np.nan])
+    # twice its yield displacement, linear or by that of HAZUS; given; of unknown system
+    assert_array_equal(elastic_ratios(pairs)["elastic_ratio_1"], [2.0, 2.0, np.nan, np.nan])
 
 
 @pytest.mark.parametrize(

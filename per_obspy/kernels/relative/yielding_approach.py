@@ -1,0 +1,180 @@
+"""
+Largest approach of many pairs of bilinear structures at the samples of one record.
+
+The yielding part of the spring is an input: with the plastic displacement p a structure of the
+hardening alpha is the linear one under the acceleration ``a - (1 - alpha) omega² p``, whose step is
+exact where both are linear between samples. In a step p grows by what its elastic displacement
+``u - p`` at the end has beyond the yield displacement, over the part of a change of p that u does
+not follow. So every structure, elastic or not, is the same arithmetic in every step. Where yielding
+begins or ends between two samples p bends; the error is of second order in the step.
+"""
+
+import numpy as np
+
+from per_obspy.kernels._aligned import aligned_line
+from per_obspy.kernels._jit import inlined, kernel, lean, vectorised
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE
+
+#: Pairs next to each other: a constant trip count, which the compiler turns into vectors.
+LANES = 32
+#: Steps between two checks whether free vibration can still raise a maximum.
+CHECKED_STEPS = 64
+
+#: Rows of a structure in a block, one column per pair: displacement, velocity over omega, plastic
+#: displacement; what a step makes of these and of the acceleration at its start and its end, of
+#: displacement and of velocity; what a change of p adds to both; yield displacement; growth of p
+#: over what is beyond it; omega; hardening. After both structures: the direction, and the largest
+#: relative displacement and velocity.
+STRUCTURE, DIRECTION, ROWS = 19, 38, 42
+U, Z, P = (row * LANES for row in range(3))
+UU, UZ, UP, U0, U1, ZU, ZZ, ZP, Z0, Z1 = (row * LANES for row in range(3, 13))
+UD, ZD, LIMIT, GROWTH, OMEGA, HARDENING = (row * LANES for row in range(13, 19))
+SECOND = STRUCTURE * LANES
+NORTH, EAST, DISTANCE, SPEED = (row * LANES for row in range(DIRECTION, ROWS))
+
+
+@kernel
+def yielding_approach(north, east, dt, shaken, pairs, largest):
+    """
+    Fill the largest relative displacements and velocities of pairs that may yield, at the samples.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) ndarray
+        Components of the ground acceleration, m/s², and zeros after the record, in which free
+        vibration is followed as far as it counts; a multiple of ``CHECKED_STEPS`` and one sample.
+    dt : float
+        Time between samples, s.
+    shaken : int
+        Samples of the record itself.
+    pairs : (12, n) ndarray
+        Rows: circular frequency (rad/s), damping (fraction of critical), participation
+        (dimensionless), yield displacement at contact level (m) and hardening of structure 1, then
+        of 2; cosine and sine of the azimuth from 1 to 2.
+    largest : (2, n) ndarray
+        Receives the maxima of ``q1 u1 - q2 u2``, m, and of ``q1 v1 - q2 v2``, m/s.
+    """
+    table = np.zeros((ROWS, LANES))
+    for first in range(0, pairs.shape[1], LANES):
+        # the last block has copies of its last pair
+        for lane in range(LANES):
+            _pack(pairs, min(first + lane, pairs.shape[1] - 1), dt, table, lane)
+        local = aligned_line(table, ROWS, LANES)
+        for step in range(0, north.size - 1, CHECKED_STEPS):
+            if step >= shaken and _is_settled(local):
+                break
+            _flush(local)
+            for i in range(step, step + CHECKED_STEPS, 4):
+                # samples at the ends of four steps
+                n0, n1, n2, n3, n4 = (
+                    north[i],
+                    north[i + 1],
+                    north[i + 2],
+                    north[i + 3],
+                    north[i + 4],
+                )
+                e0, e1, e2, e3, e4 = east[i], east[i + 1], east[i + 2], east[i + 3], east[i + 4]
+                _step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+        for lane in range(min(LANES, pairs.shape[1] - first)):
+            largest[0, first + lane] = local[DISTANCE + lane]
+            largest[1, first + lane] = local[SPEED + lane]
+
+
+@lean
+def _pack(pairs, number, dt, table, lane):
+    """Fill the column of a pair at rest."""
+    for row in range(ROWS):
+        table[row, lane] = 0.0
+    for body in range(2):
+        row, column = STRUCTURE * body, 5 * body
+        omega, share = pairs[column, number], pairs[column + 2, number]
+        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(
+            omega, pairs[column + 1, number], dt
+        )
+        # acceleration of a plastic displacement of 1
+        drive = -(1.0 - pairs[column + 4, number]) * omega * omega
+        table[row + 3, lane], table[row + 4, lane] = a11, a12
+        table[row + 5, lane] = drive * (b11 + b12)
+        table[row + 6, lane], table[row + 7, lane] = share * b11, share * b12
+        table[row + 8, lane], table[row + 9, lane] = a21, a22
+        table[row + 10, lane] = drive * (b21 + b22)
+        table[row + 11, lane], table[row + 12, lane] = share * b21, share * b22
+        table[row + 13, lane], table[row + 14, lane] = drive * b12, drive * b22
+        table[row + 15, lane] = pairs[column + 3, number]
+        table[row + 16, lane] = 1.0 / (1.0 - drive * b12)
+        table[row + 17, lane], table[row + 18, lane] = omega, pairs[column + 4, number]
+    table[DIRECTION, lane], table[DIRECTION + 1, lane] = pairs[10, number], pairs[11, number]
+
+
+@vectorised
+def _flush(t):
+    """Replace denormal numbers, which are slow, by zero."""
+    for lane in range(LANES):
+        for body in range(0, 2 * SECOND, SECOND):
+            for row in (U, Z):
+                value = t[body + row + lane]
+                t[body + row + lane] = value if abs(value) > SMALLEST_STATE else 0.0
+
+
+@vectorised
+def _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
+    """Advance a block by four steps."""
+    for lane in range(LANES):
+        # accelerations along the azimuth, and states of structures 1 and 2
+        cosine, sine = t[NORTH + lane], t[EAST + lane]
+        a0, a1, a2 = cosine * n0 + sine * e0, cosine * n1 + sine * e1, cosine * n2 + sine * e2
+        a3, a4 = cosine * n3 + sine * e3, cosine * n4 + sine * e4
+        u, z, p = t[U + lane], t[Z + lane], t[P + lane]
+        w, y, r = t[SECOND + U + lane], t[SECOND + Z + lane], t[SECOND + P + lane]
+        omega, omega_2 = t[OMEGA + lane], t[SECOND + OMEGA + lane]
+        distance, speed = t[DISTANCE + lane], t[SPEED + lane]
+        # relative displacement and velocity after each step
+        u, z, p = _moved(t, lane, u, z, p, a0, a1)
+        w, y, r = _moved(t, SECOND + lane, w, y, r, a0, a1)
+        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        u, z, p = _moved(t, lane, u, z, p, a1, a2)
+        w, y, r = _moved(t, SECOND + lane, w, y, r, a1, a2)
+        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        u, z, p = _moved(t, lane, u, z, p, a2, a3)
+        w, y, r = _moved(t, SECOND + lane, w, y, r, a2, a3)
+        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        u, z, p = _moved(t, lane, u, z, p, a3, a4)
+        w, y, r = _moved(t, SECOND + lane, w, y, r, a3, a4)
+        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        t[U + lane], t[Z + lane], t[P + lane] = u, z, p
+        t[SECOND + U + lane], t[SECOND + Z + lane], t[SECOND + P + lane] = w, y, r
+        t[DISTANCE + lane], t[SPEED + lane] = distance, speed
+
+
+@inlined
+def _moved(t, k, u, z, p, start, end):
+    """Return the state of a structure after one step."""
+    # as if it did not yield
+    forcing = t[UP + k] * p + (t[U0 + k] * start + t[U1 + k] * end)
+    after = t[UU + k] * u + (t[UZ + k] * z + forcing)
+    forcing = t[ZP + k] * p + (t[Z0 + k] * start + t[Z1 + k] * end)
+    speed = t[ZU + k] * u + (t[ZZ + k] * z + forcing)
+    # the elastic displacement is at most the yield displacement
+    elastic, limit = after - p, t[LIMIT + k]
+    grown = t[GROWTH + k] * (elastic - min(max(elastic, -limit), limit))
+    return after + t[UD + k] * grown, speed + t[ZD + k] * grown, p + grown
+
+
+@lean
+def _is_settled(t):
+    """Return whether free vibration can raise no largest value, nor make a structure yield."""
+    for lane in range(LANES):
+        reach = speed = 0.0
+        for body in range(2):
+            k = body * SECOND + lane
+            # about the displacement at rest, which a plastic one leaves; nothing yields any more
+            plastic = (1.0 - t[HARDENING + k]) * t[P + k]
+            radius = np.hypot(t[U + k] - plastic, t[Z + k])
+            if abs(plastic - t[P + k]) + radius > t[LIMIT + k]:
+                return False
+            reach += radius + (plastic if body == 0 else -plastic)
+            speed += t[OMEGA + k] * radius
+        if reach > t[DISTANCE + lane] or speed > t[SPEED + lane]:
+            return False
+    return True
