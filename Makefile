@@ -4,6 +4,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 # Where a machine forbids compiled modules, every process would compile package and tests anew
 unexport PYTHONDONTWRITEBYTECODE
+# Modules are compiled when they are imported first: most of the libraries' never are
+export PIP_COMPILE ?= 0
 
 .PHONY: demo figures test test-long workflows rehearsal check docs wheel benchmark extras constraints clean
 
@@ -79,7 +81,7 @@ benchmark: .venv/benchmark
 	$(PYTHON) -m venv .venv
 
 .venv/run: .venv/bin/python pyproject.toml
-	@echo "== install per_obspy and what it needs (a minute or two)"
+	@echo "== install per_obspy and what it needs (about a minute)"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@echo "== compile the kernels (once, one to two minutes)"
 	$(BIN)/per-obspy warm-up

@@ -437,7 +437,7 @@ def _azimuthal_spectra(
 
 def _by_azimuth(name: str, values: FloatArray, title: str, step: int) -> dict[str, Variable]:
     """Return the stored azimuths and the percentiles of a spectrum (damping, period, azimuth)."""
-    stored = np.moveaxis(values[..., ::step], -1, 0).astype(np.float32)
+    stored = np.ascontiguousarray(np.moveaxis(values[..., ::step], -1, 0), dtype=np.float32)
     along = {
         "units": "m",
         "long_name": f"{title} of the horizontal motion along the azimuth",

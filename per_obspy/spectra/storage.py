@@ -6,10 +6,11 @@ region contains the spectra of all stations along the dimension ``station`` with
 """
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import netCDF4
+import numpy as np
 import xarray as xr
 from obspy import Stream, Trace
 
@@ -22,20 +23,35 @@ from per_obspy.spectra.station import station_spectra
 #: Variables of the motion, sample by sample, which only the station files contain.
 MOTION = ("acceleration", "horizontal_azimuth", "sampling_interval")
 
+#: Values from which on a variable takes less space compressed.
+FEWEST_COMPRESSED = 1000
+
 
 def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     """Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all."""
-    encoding: dict[Hashable, dict[str, object]] = {
-        name: {"_FillValue": None} for name in dataset.coords
-    }
-    # Only numbers are compressed, and scalars cannot be
-    for name, variable in dataset.data_vars.items():
-        if variable.dtype.kind == "f":
-            encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}
-    # In the order in which they are read, so that the bytes do not depend on how it was made
-    ordered = dataset[[*dataset.data_vars, *dataset.coords]]
-    with written_whole(path) as part:
-        ordered.to_netcdf(part, engine="netcdf4", encoding=encoding)
+    # Coordinates of CF that are no axes: each variable names those that it has
+    places = sorted(str(name) for name in dataset.coords if name not in dataset.dims)
+    with written_whole(path) as part, netCDF4.Dataset(part, "w") as file:
+        file.setncatts(dataset.attrs)
+        for name in [*dataset.data_vars, *dataset.coords]:
+            variable = dataset.variables[name]
+            for axis in variable.dims:
+                if axis not in file.dimensions:
+                    file.createDimension(axis, dataset.sizes[axis])
+            is_text, is_coordinate = variable.dtype.kind not in "fi", name in dataset.coords
+            stored = file.createVariable(
+                name,
+                str if is_text else variable.dtype,
+                variable.dims,
+                fill_value=np.nan if variable.dtype.kind == "f" and not is_coordinate else None,
+                # Processed samples take as much space compressed, and twice the time
+                zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
+            )
+            stored.setncatts(variable.attrs)
+            own = [place for place in places if {*dataset.variables[place].dims} <= {*variable.dims}]
+            if own and not is_coordinate:
+                stored.coordinates = " ".join(own)
+            stored[...] = variable.values.astype(object) if is_text else variable.values
 
 
 def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
@@ -44,31 +60,27 @@ def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
 
     A file that is missing, damaged or of another kind is a `CatalogError`.
     """
-    # From the file, or from its bytes
+    # A name that exists would be opened too
+    source = path if content is None else f"{path.name} in memory"
     try:
-        dataset = xr.load_dataset(
-            path if content is None else _in_memory(path, content),
-            engine="netcdf4" if content is None else None,
-            decode_times=False,
-            decode_timedelta=False,
-        )
-    except (OSError, ValueError) as error:
-        raise CatalogError(str(path), f"cannot be read as netCDF: {error}") from error
-    if "per" not in dataset:
-        raise CatalogError(
-            str(path), f"has no variable 'per', only {sorted(map(str, dataset.variables))}"
-        )
-    return dataset
-
-
-def _in_memory(path: Path, content: bytes) -> xr.backends.NetCDF4DataStore:
-    """Open the bytes of a netCDF file; an error names the file."""
-    try:
-        # A name that exists would be opened too
-        file = netCDF4.Dataset(f"{path.name} in memory", memory=content)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
-    return xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+        with netCDF4.Dataset(source, memory=content) as file:
+            file.set_auto_maskandscale(False)
+            variables, places = {}, set[str]()
+            for name, stored in file.variables.items():
+                attributes = dict(stored.__dict__)
+                attributes.pop("_FillValue", None)
+                places |= {*attributes.pop("coordinates", "").split()}
+                values = stored[...]
+                values = np.asarray(values, dtype=str) if stored.dtype is str else values
+                variables[name] = (stored.dimensions, values, attributes)
+            attributes = dict(file.__dict__)
+    # Damaged parts are errors of the netCDF library
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise CatalogError(str(path), f"cannot be read as netCDF: {reason}") from error
+    if "per" not in variables:
+        raise CatalogError(str(path), f"has no variable 'per', only {sorted(variables)}")
+    return xr.Dataset(variables, attrs=attributes).set_coords(places)
 
 
 def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:

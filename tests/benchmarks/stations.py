@@ -62,7 +62,7 @@ def one_station(records: Path, folder: Path) -> tuple[float, dict[str, float], i
 
         setattr(work, name, measured)
 
-    for name in ("process_station", "station_spectra", "write_spectra", "_read_shard"):
+    for name in ("process_station", "station_spectra", "write_spectra"):
         timed(name)
     found = find_sources(Records(folder=records, event=records / "event.xml"), None)
     output = folder / "alone"

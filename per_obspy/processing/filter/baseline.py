@@ -288,10 +288,13 @@ def final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[flo
 
     The samples are acceleration, m/s2; at least two follow the start.
     """
-    velocity = cumulative_trapezoid(samples, time, initial=0)
-    after = time >= start
-    constant, slope = Polynomial.fit(time[after], velocity[after], 1).convert().coef
-    return float(constant), float(slope)
+    after = slice(int(np.searchsorted(time, start)), None)
+    velocity = cumulative_trapezoid(samples, time, initial=0)[after]
+    # Least squares about the means, which are as accurate as orthogonal polynomials
+    middle, mean = time[after].mean(), velocity.mean()
+    times = time[after] - middle
+    slope = times @ (velocity - mean) / (times @ times)
+    return float(mean - slope * middle), float(slope)
 
 
 def residual_velocity(samples: FloatArray, time: FloatArray, end: float) -> float:

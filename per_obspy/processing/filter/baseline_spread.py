@@ -18,6 +18,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
 from per_obspy.processing.filter.baseline import final_line, residual_velocity, sample_times
 from per_obspy.processing.filter.butterworth import butterworth_amplitude, thin_spectrum
+from per_obspy.processing.series import without_line
 from per_obspy.spectra.elastic import per_spectrum
 
 #: Periods at which PER is compared, s.
@@ -140,11 +141,9 @@ def _log_per(motions: Iterable[FloatArray], interval: float) -> FloatArray:
 
 def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
     """Return the velocity that a shift leaves before and after the shaking, without a line, m/s."""
-    from scipy.signal import detrend  # in workers only, see instrument_response
-
     left, before = [], time <= shaking.onset
     # The record as it is, or without its straight line: the smaller one
-    for straight in (samples, detrend(samples)):
+    for straight in (samples, without_line(samples)):
         early = abs(np.trapezoid(straight[before], dx=time[1]))
         left.append(early + residual_velocity(straight, time, shaking.end))
     return float(min(left))

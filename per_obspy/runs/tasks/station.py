@@ -119,6 +119,8 @@ class Products(NamedTuple):
     files: tuple[Path, ...] = ()
     #: Plain values that the status file holds besides.
     facts: Mapping[str, object] = MappingProxyType({})
+    #: Content of a station file with spectra, without the motion.
+    spectra: xr.Dataset | None = None
 
 
 def spectra_shard(task: "StationTask", stream: "Stream", source: "Source | None") -> Products:
@@ -132,7 +134,7 @@ def spectra_shard(task: "StationTask", stream: "Stream", source: "Source | None"
     dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
     dataset.attrs |= hypocentre_attributes(task.event)
     write_spectra(dataset, task.shard)
-    return Products(unfit, (task.shard,))
+    return Products(unfit, (task.shard,), spectra=without_motion(dataset))
 
 
 class FinishedStation(NamedTuple):
@@ -214,7 +216,7 @@ class StationTask(Resumable[FinishedStation]):
         decisions = list[dict[str, Any]]()
         products = _products(self, decisions)
         has_shard = self.shard in products.files
-        digest, spectra = _read_shard(self.shard) if has_shard else ("", None)
+        digest = file_hash(self.shard) if has_shard else ""
         # The status comes last: it is valid for whole files only
         others = [file for file in products.files if file != self.shard]
         outputs = {_from_status(self.shard, file): file_hash(file) for file in others}
@@ -223,7 +225,9 @@ class StationTask(Resumable[FinishedStation]):
         facts |= {"source": source_facts(self.event), "decisions": decisions}
         write_status(self.status, self.key, outputs, facts)
         shard = self.shard if has_shard else None
-        return FinishedStation(self.station, shard, products.rejected, False, digest, spectra)
+        return FinishedStation(
+            self.station, shard, products.rejected, False, digest, products.spectra
+        )
 
     def failed(self, reason: str) -> FinishedStation:
         """Return the station after a failure; the next run repeats it."""
@@ -281,13 +285,13 @@ def _products(task: StationTask, decisions: list[dict[str, Any]]) -> Products:
     return products._replace(rejected=(*unread, *unfit))
 
 
-def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Dataset | None]:
+def _read_shard(shard: Path, expected: str) -> tuple[str, xr.Dataset | None]:
     """Return hash and spectra of a station file, opened once; no spectra if its hash differs."""
     if shard.suffix != SPECTRA:
         return file_hash(shard), None
     content = shard.read_bytes()
     digest = bytes_hash(content)
-    if digest != (expected or digest):
+    if digest != expected:
         return digest, None
     return digest, without_motion(read_spectra(shard, content))
 
