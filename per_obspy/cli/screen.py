@@ -63,6 +63,7 @@ ENSEMBLE_COLUMNS = (
     "annual_probability",
     "worst_scenario",
     "gap",
+    "gap_for_target",
 )
 
 #: Rows of the worst pairs that are printed.

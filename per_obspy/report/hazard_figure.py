@@ -1,4 +1,4 @@
-"""Figure of pairs under a seismic hazard: the gap of each beside the gap for the target rate."""
+"""Figure of pairs under a hazard or rated scenarios: each gap, and that for the target rate."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def draw_gaps_for_target(table: pd.DataFrame, target_rate: float, path: Path) ->
     Parameters
     ----------
     table : DataFrame
-        From :func:`per_obspy.screening.hazard.hazard_table`.
+        ``gap`` and ``gap_for_target``, m, one row per pair.
     target_rate : float
         Annual rate of contact that is accepted, 1/year.
     path : Path
@@ -38,6 +38,6 @@ def draw_gaps_for_target(table: pd.DataFrame, target_rate: float, path: Path) ->
     ends = [NARROWEST, max(*gap, *needed, 1.0)]
     axes.plot(ends, ends, color=FAINT_COLOUR, linewidth=1.0)
     axes.set(xlabel="gap (m); 1 mm and less on the edge", ylabel="gap for the target (m)")
-    axes.set_title(f"Gap exceeded once in {1.0 / target_rate:.0f} years by the hazard", fontsize=11)
+    axes.set_title(f"Gap that contact exceeds once in {1.0 / target_rate:.0f} years", fontsize=11)
     axes.legend(fontsize=8)
     save(figure, path, False)

@@ -285,8 +285,10 @@ def report_design(
     return report
 
 
-def _draw_gaps(settings: Design, table: pd.DataFrame, folder: Path, report: Report) -> None:
-    """Draw the gaps for the target rate of a hazard."""
+def _draw_gaps(
+    settings: Design | Ensemble, table: pd.DataFrame, folder: Path, report: Report
+) -> None:
+    """Draw the gaps for the target rate."""
     figure = folder / "figures" / "gap_for_target.png"
     with report.tried(figure):
         draw_gaps_for_target(table, settings.target_rate, figure)
@@ -343,6 +345,9 @@ def report_ensemble(
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))
     pairs = _pair_table(settings, pieces, coverage.screened, runs.totals(), runs.outlines())
     write_report(results, pairs, folder, report)
+    if settings.yearly:
+        gaps = pd.read_parquet(table, columns=["gap", "gap_for_target"])
+        _draw_gaps(settings, gaps, folder, report)
     return report
 
 
