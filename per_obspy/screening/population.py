@@ -227,6 +227,15 @@ COLUMNS = (
     *DEMAND_SHARES,
 )
 
+
+def empty_population(count: int) -> Columns:
+    """Return ``COLUMNS`` to be filled; single precision is enough for the quantiles of a demand."""
+    return {
+        name: np.zeros(count, np.float32 if name in DEMAND_SHARES else np.float64)
+        for name in COLUMNS
+    }
+
+
 #: Smallest quantile of a demand, m: that of buildings that move as one.
 SMALLEST_QUANTILE = 1e-6
 
@@ -408,7 +417,7 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
     grid.
     """
     count = motion.row.size
-    result: Columns = {name: np.empty(count) for name in COLUMNS}
+    result = empty_population(count)
     size = SAMPLES // len(NODES)
     # blocks bound the memory; a pair does not depend on its block
     for first in range(0, count, size):
