@@ -114,9 +114,13 @@ class Design(Section):
 
     spectrum: RelativePath = Field(
         description=(
-            "CSV: period (s), damping, and sd (m) or psa (m/s2); or uniform hazard spectra of "
-            "OpenQuake"
+            "CSV: period (s), damping, and sd (m) or psa (m/s2); or a hazard of OpenQuake: uniform "
+            "hazard spectra, a hazard curve, or a folder of hazard curves of several SA"
         )
+    )
+    shape: RelativePath | None = Field(
+        None,
+        description="design spectrum whose shape a hazard curve of PGA or of one SA scales",
     )
     target_rate: float = Field(
         TARGET_RATE,

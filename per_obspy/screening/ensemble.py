@@ -238,7 +238,7 @@ def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatAr
         Demands that the shares of ``DEMAND_SHARES`` do not exceed in each scenario, m, rising.
         Between them, and beyond, the logarithm of the demand is linear in the normal score of the
         share.
-    rates : (n_scenarios,) array_like
+    rates : (n_scenarios,) or (n_scenarios, n_pairs) array_like
         Rate of each scenario, 1/year.
     target : float
         Annual rate of contact, 1/year.

@@ -12,7 +12,8 @@ from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.errors import CatalogError
 from per_obspy.pounding.reliability import sd_error
 from per_obspy.screening.design import DesignSpectrum, design_table
-from per_obspy.screening.hazard import exceedance_rate, hazard_table, read_hazard
+from per_obspy.screening.hazard import hazard_table, shares_of_rates
+from per_obspy.screening.hazard_files import read_hazard
 
 #: Rates of the spectra, 1/year, falling, and the exponent of the hazard: SA grows as rate^(-1/2.5).
 RATES, EXPONENT = np.geomspace(0.1, 1e-5, 9), 2.5
@@ -121,11 +122,12 @@ def test_pairs_far_from_every_site_or_outside_the_periods_are_rejected(tmp_path)
         screened(hazard, [{}], target=0.5)
 
 
-def test_half_the_chance_is_half_the_rate():
-    rates = np.array([0.1, 0.03, 0.001])
-    assert_allclose(exceedance_rate(np.full(3, 0.5), rates), 0.05, rtol=1e-12)
-    # of the rarest motions alone
-    assert_allclose(exceedance_rate(np.array([0.0, 0.0, 1.0]), rates), 0.0155, rtol=1e-12)
+def test_motions_share_all_rates():
+    shares = shares_of_rates(np.array([0.1, 0.03, 0.001]))
+    # a contact in every motion is as frequent as the first, one in the rarest alone half as
+    # frequent as both of the last together
+    assert_allclose(shares.sum(), 0.1, rtol=1e-12)
+    assert_allclose(shares[-1], 0.0155, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -163,5 +165,5 @@ def test_two_spectra_of_one_place_are_refused(tmp_path):
     assert read_hazard(path).longitude.size == 2
     *rows, last = path.read_text().splitlines()
     path.write_text("\n".join([*rows, last.replace("0.1990535852767486", "0.19")]))
-    with pytest.raises(CatalogError, match="site 2: has another SA"):
+    with pytest.raises(CatalogError, match="site 2: has other values"):
         read_hazard(path)
