@@ -318,7 +318,7 @@ HAZARD: dict[str, Column] = {
             "missing_gap_for_target",
             "float64",
             "m",
-            "widening to the gap_for_target; 0 if it is there",
+            "widening to the gap_for_target; 0 if the gap of the table, taken as right, has it",
         ),
     )
 }

@@ -210,7 +210,9 @@ def ensemble_rows(
     columns: Columns = {"probability": conditional_probability(pounding, weight)}
     if yearly:
         columns["annual_probability"] = annual_probability(pounding, weight)
-        needed = gap_for_rate(demands_of(rows, weights), weight, target_rate)
+        quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
+        demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
+        needed = gap_for_rate(demands, weight, target_rate)
         missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
         columns |= dict(zip(GAPS, (needed, missing), strict=True))
     for severity, (name, unknown) in zip(severities, SEVERITY.items(), strict=True):
@@ -220,12 +222,6 @@ def ensemble_rows(
     columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
     return rows.assign(**columns)[names]
-
-
-def demands_of(rows: pd.DataFrame, weights: Mapping[str, float]) -> FloatArray:
-    """Return the quantiles of the demand, m: (n_scenarios, n_shares, n_pairs)."""
-    names = [[f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights]
-    return np.array([rows.reindex(columns=one).to_numpy(np.float64).T for one in names])
 
 
 def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatArray:

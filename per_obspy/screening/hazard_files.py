@@ -26,7 +26,6 @@ from per_obspy.screening.design import (
     require_header,
 )
 from per_obspy.screening.station_motion import LogSpectra, stored_log
-from per_obspy.screening.values import IndexArray
 
 #: Probability and period of a column of spectra; the name of a repeated one is numbered by pandas.
 _LEVEL = re.compile(r"(0?\.\d+(?:[eE]-?\d+)?|\d(?:\.\d+)?[eE]-\d+)~SA\((\d+(?:\.\d+)?)\)(?:\.\d+)?")
@@ -47,58 +46,27 @@ PEAK_PERIOD = 0.05
 
 
 class HazardSpectra(NamedTuple):
-    """
-    Uniform hazard spectra of several sites.
+    """Uniform hazard spectra of several sites."""
 
-    Attributes
-    ----------
-    name : str
-        File or folder of the hazard.
-    longitude, latitude : (n_sites,) ndarray
-        Degrees.
-    rates : (n_sites, n_levels) ndarray
-        Annual rates of exceedance, 1/year, falling; NaN at a site whose curves have no rate in
-        common.
-    periods : (n_periods,) ndarray
-        s, rising.
-    sd : (n_sites, n_levels, n_periods) ndarray
-        Spectral displacement at 5 % damping, m.
-    """
-
-    name: str
-    longitude: FloatArray
+    name: str  # file or folder
+    longitude: FloatArray  # degrees, (n_sites,)
     latitude: FloatArray
+    # Of exceedance, 1/year, falling, (n_sites, n_levels); NaN at a site whose curves have none in
+    # common
     rates: FloatArray
-    periods: FloatArray
-    sd: FloatArray
+    periods: FloatArray  # s, rising
+    sd: FloatArray  # at 5 % damping, m, (n_sites, n_levels, n_periods)
 
 
 class HazardCurve(NamedTuple):
-    """
-    Hazard curves of one measure at several sites.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    kind : str
-        ``mean``, ``quantile-0.5``, ``rlz-001``, ...; empty where the file has none.
-    period : float
-        s; 0 of the peak ground acceleration.
-    places : DataFrame
-        ``lon``, ``lat`` of the sites, degrees.
-    intensities : (n_intensities,) ndarray
-        m/s2, rising.
-    rates : (n_sites, n_intensities) ndarray
-        Annual rates of exceedance, 1/year; infinite where the probability is 1.
-    """
+    """Hazard curves of one measure at several sites."""
 
     path: Path
-    kind: str
-    period: float
-    places: pd.DataFrame
-    intensities: FloatArray
-    rates: FloatArray
+    kind: str  # mean, quantile-0.5, rlz-001, ...; empty where the file has none
+    period: float  # s; 0 of the peak ground acceleration
+    places: FloatArray  # longitude and latitude, degrees, (n_sites, 2), in their order
+    intensities: FloatArray  # m/s2, rising
+    rates: FloatArray  # of exceedance, 1/year, (n_sites, n_intensities); infinite where certain
 
 
 def is_hazard(path: Path) -> bool:
@@ -262,25 +230,23 @@ def _curve(path: Path, table: pd.DataFrame, head: str) -> HazardCurve:
     # A certain motion has an infinite rate
     with np.errstate(divide="ignore"):
         rates = -np.log1p(-chance) / _years(path, head)
-    period = float(measure[2] or 0.0)
-    return HazardCurve(path, _fact(_KIND, head), period, places, intensities[order], rates)
+    # Every site once, in the same order in all files
+    sites = places.drop_duplicates().sort_values(["lon", "lat"])
+    place, rates = sites.to_numpy(np.float64), rates[sites.index]
+    kind, period = _fact(_KIND, head), float(measure[2] or 0.0)
+    return HazardCurve(path, kind, period, place, intensities[order], rates)
 
 
 def _joined(path: Path, curves: Sequence[HazardCurve]) -> HazardSpectra:
     """Return the spectra of several measures at the sites of all of them."""
-    first = curves[0]
-    sites = first.places.drop_duplicates()
-    rows = [_rows_of_sites(curve, sites) for curve in curves]
-    periods = np.array([curve.period for curve in curves])
-    # Rates that every measure has
-    spans = np.array([_span(curve.rates[row]) for curve, row in zip(curves, rows, strict=True)])
-    most, least = spans[:, 0].min(axis=0), spans[:, 1].max(axis=0)
-    rates = _between(most, least)
-    psa = np.stack(
-        [_at_rates(curve, row, rates) for curve, row in zip(curves, rows, strict=True)], axis=-1
-    )
-    east, north = sites.to_numpy().T
-    return HazardSpectra(str(path), east, north, rates, periods, psa * (periods / 2 / np.pi) ** 2)
+    for curve in curves:
+        if not np.array_equal(curve.places, curves[0].places):
+            raise CatalogError(str(curve.path), f"has other sites than {curves[0].path.name}")
+    periods, rates = np.array([curve.period for curve in curves]), _common_rates(curves)
+    psa = np.stack([_at_rates(curve, rates) for curve in curves], axis=-1)
+    sd = psa * (periods / (2.0 * np.pi)) ** 2
+    east, north = curves[0].places.T
+    return HazardSpectra(str(path), east, north, rates, periods, sd)
 
 
 def _shaped(path: Path, curve: HazardCurve, shape: DesignSpectrum) -> HazardSpectra:
@@ -288,60 +254,41 @@ def _shaped(path: Path, curve: HazardCurve, shape: DesignSpectrum) -> HazardSpec
     dampings, periods = shape.dampings, shape.periods
     if not dampings[0] <= REFERENCE_DAMPING <= dampings[-1]:
         raise CatalogError(shape.name, "shape: needs a damping of 0.05")
-    longest = PEAK_PERIOD if curve.period == 0.0 else curve.period
-    if not periods[0] <= longest or not curve.period <= periods[-1]:
+    if not (periods[0] <= (curve.period or PEAK_PERIOD) and curve.period <= periods[-1]):
         measure = f"SA({curve.period:g})" if curve.period else f"PGA, at {PEAK_PERIOD:g} s or less"
         raise CatalogError(shape.name, f"shape: has no ordinate for the curve of {measure}")
-    # SD at 5 % damping, and pseudo-acceleration at the period of the curve or the shortest one
+    # SD at 5 % damping, the last at the period of the curve, or at the shortest one
+    wanted = np.append(periods, max(curve.period, periods[0]))
     spectra = LogSpectra(np.log(periods), np.log(dampings), np.log(shape.sd)[None])
-    anchor = max(curve.period, periods[0])
-    wanted = np.append(periods, anchor)
-    row = np.zeros(wanted.size, dtype=np.intp)
     ln_damping = np.full(wanted.size, np.log(REFERENCE_DAMPING))
-    *sd, at_anchor = np.exp(stored_log(spectra, row, np.log(wanted), ln_damping))
-    ordinate = at_anchor * (2.0 * np.pi / anchor) ** 2
-    sites = curve.places.drop_duplicates()
-    rows = sites.index.to_numpy()
-    rates = _between(*_span(curve.rates[rows]))
-    scale = _at_rates(curve, rows, rates) / ordinate
-    east, north = sites.to_numpy().T
-    return HazardSpectra(str(path), east, north, rates, periods, scale[:, :, None] * np.array(sd))
+    row = np.zeros(wanted.size, dtype=np.intp)
+    sd = np.exp(stored_log(spectra, row, np.log(wanted), ln_damping))
+    ordinate, rates = sd[-1] * (2.0 * np.pi / wanted[-1]) ** 2, _common_rates([curve])
+    scale = _at_rates(curve, rates)[:, :, None] / ordinate
+    east, north = curve.places.T
+    return HazardSpectra(str(path), east, north, rates, periods, scale * sd[:-1])
 
 
-def _rows_of_sites(curve: HazardCurve, sites: pd.DataFrame) -> IndexArray:
-    """Return the rows of a curve at the sites of another one."""
-    own = curve.places.drop_duplicates()
-    numbers = pd.Series(own.index, index=pd.MultiIndex.from_frame(own))
-    rows = numbers.reindex(pd.MultiIndex.from_frame(sites))
-    if rows.isna().any() or len(own) != len(sites):
-        raise CatalogError(str(curve.path), "has other sites than the first measure beside it")
-    return rows.to_numpy(np.intp)
-
-
-def _span(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest and the smallest usable rate of every site, (n_sites,)."""
+def _common_rates(curves: Sequence[HazardCurve]) -> FloatArray:
+    """Return rates of every site that all its curves have, falling, (n_sites, LEVELS)."""
     # A certain motion has no rate, one that never comes has no intensity
-    usable = np.isfinite(rates) & (rates > 0.0)
-    most = np.where(usable, rates, -np.inf).max(axis=1)
-    return most, np.where(usable, rates, np.inf).min(axis=1)
-
-
-def _between(most: FloatArray, least: FloatArray) -> FloatArray:
-    """Return rates from the largest to the smallest of every site, (n_sites, LEVELS)."""
-    known = np.isfinite(most) & np.isfinite(least) & (most > least)
-    rates = np.full((most.size, LEVELS), np.nan)
+    usable = [np.isfinite(curve.rates) & (curve.rates > 0.0) for curve in curves]
+    both = list(zip(curves, usable, strict=True))
+    most = np.min([np.where(use, one.rates, -np.inf).max(axis=1) for one, use in both], axis=0)
+    least = np.max([np.where(use, one.rates, np.inf).min(axis=1) for one, use in both], axis=0)
+    known, rates = most > least, np.full((most.size, LEVELS), np.nan)
     rates[known] = np.geomspace(most[known], least[known], LEVELS, axis=1)
     # Ends without round-off, as they are in the curve
     rates[known, 0], rates[known, -1] = most[known], least[known]
     return rates
 
 
-def _at_rates(curve: HazardCurve, rows: IndexArray, rates: FloatArray) -> FloatArray:
+def _at_rates(curve: HazardCurve, rates: FloatArray) -> FloatArray:
     """Return the intensities at rates of sites, m/s2; their logarithms are linear in the rates'."""
     result = np.full(rates.shape, np.nan)
     ln_intensity = np.log(curve.intensities)
     for number in np.flatnonzero(np.isfinite(rates[:, 0])):
-        own = curve.rates[rows[number]]
+        own = curve.rates[number]
         # Of equal rates the strongest motion
         usable = np.isfinite(own) & (own > 0.0) & (own > np.append(own[1:], 0.0))
         known = np.log(own[usable])[::-1], ln_intensity[usable][::-1]

@@ -264,7 +264,7 @@ SECOND = "c/hazard_curve-mean-SA(1.0)_12.csv"
             SECOND,
             "\n20.0",
             "\n21.0",
-            "has other sites than the first",
+            "has other sites than hazard_curve-mean-SA(0.5)",
         ),
         (
             SECOND,
