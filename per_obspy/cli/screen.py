@@ -30,7 +30,7 @@ from per_obspy.cli.watch import (
     log_ending,
     logged,
 )
-from per_obspy.errors import printable
+from per_obspy.errors import CatalogError, printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,6 +63,7 @@ ENSEMBLE_COLUMNS = (
     "annual_probability",
     "worst_scenario",
     "gap",
+    "gap_for_target",
 )
 
 #: Rows of the worst pairs that are printed.
@@ -150,7 +151,8 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.report.page.background import require_background
     from per_obspy.runs.inputs.extras import require_extras
     from per_obspy.screening.design import design_table, read_design_spectrum
-    from per_obspy.screening.hazard import hazard_table, is_hazard, read_hazard
+    from per_obspy.screening.hazard import hazard_table
+    from per_obspy.screening.hazard_files import is_hazard, read_hazard
 
     # Whatever would stop the report later
     settings = in_language(load(configuration, Design), language)
@@ -159,8 +161,10 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     # Screen: by the hazard of many motions, or by one spectrum
     pairs, given = read_pairs(settings.pairs), (settings.building, settings.screening)
     if is_hazard(settings.spectrum):
-        hazard = read_hazard(settings.spectrum)
+        hazard = read_hazard(settings.spectrum, settings.shape)
         table = hazard_table(hazard, pairs, *given, settings.target_rate)
+    elif settings.shape is not None:
+        raise CatalogError(str(configuration), "shape: spectrum is no hazard curve that needs one")
     else:
         table = design_table(read_design_spectrum(settings.spectrum), pairs, *given)
     coverage = _coverage(settings, table)

@@ -105,20 +105,28 @@ class Run(Section):
         return self
 
 
+#: Once in 475 years, or by 10 % in 50 years.
+TARGET_RATE = 1.0 / 475.0
+
+
 class Design(Section):
     """A screening by a design or user spectrum instead of records."""
 
     spectrum: RelativePath = Field(
         description=(
-            "CSV: period (s), damping, and sd (m) or psa (m/s2); or uniform hazard spectra of "
-            "OpenQuake"
+            "CSV: period (s), damping, and sd (m) or psa (m/s2); or a hazard of OpenQuake: uniform "
+            "hazard spectra, a hazard curve, or a folder of hazard curves of several SA"
         )
     )
+    shape: RelativePath | None = Field(
+        None,
+        description="design spectrum whose shape a hazard curve of PGA or of one SA scales",
+    )
     target_rate: float = Field(
-        1.0 / 475.0,
+        TARGET_RATE,
         gt=0,
         le=1,
-        description="annual rate of contact that is accepted, 1/year; of uniform hazard spectra",
+        description="annual rate of contact that is accepted, 1/year; of a seismic hazard",
     )
     pairs: RelativePath = Field(description="pair table, CSV or Parquet")
     output: RelativePath = Field(description="folder of the results")
@@ -153,6 +161,13 @@ class Ensemble(Section):
     name: str = Field(min_length=1, description="title")
     output: RelativePath = Field(description="folder of the results; every run keeps its own")
     scenario: tuple[EnsembleScenario, ...] = Field(min_length=1)
+    target_rate: float = Field(
+        TARGET_RATE,
+        gt=0,
+        le=1,
+        description="annual rate of contact that is accepted, 1/year, below the sum of the rates; "
+        "of scenarios with rates",
+    )
     report: ReportTexts = ReportTexts()
     csv_rows: int = Field(
         100_000,
@@ -201,6 +216,14 @@ class Ensemble(Section):
                 )
         if not sum(self.weights.values()) > 0.0:
             raise ValueError("weights or rates must have a positive sum, all are 0")
+        if self.yearly and not self.target_rate < sum(self.weights.values()):
+            raise ValueError(
+                f"target_rate = {self.target_rate:g} is not below the sum of the rates, "
+                f"{sum(self.weights.values()):g} 1/year: without more frequent scenarios no gap "
+                "would be asked for"
+            )
+        if not self.yearly and "target_rate" in self.model_fields_set:
+            raise ValueError("target_rate needs scenarios with rates, these have weights")
         return self
 
 

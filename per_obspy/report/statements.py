@@ -13,7 +13,7 @@ from per_obspy.report.results import Results, Revision
 from per_obspy.report.style import class_colours
 from per_obspy.report.tally import HARD
 from per_obspy.report.texts import LANGUAGES, counted, fixed_phrases, written
-from per_obspy.report.words import chance_text, name_text, number, speed_text
+from per_obspy.report.words import chance_text, length_text, name_text, number, speed_text
 
 #: Pairs and buildings that a summary lists.
 LISTED = 10
@@ -200,6 +200,12 @@ def _inspections(hit: pd.DataFrame, results: Results) -> list[str]:
     # A plan mends joints, an earthquake is over
     if round(results.tally.hard) >= 1 and results.stem != "risk":
         steps.append(results.counted("todo_retrofit", _rounded(results.tally.hard)))
+    # Rates ask for the joints that contact visits most often
+    if "missing_gap_for_target" in hit:
+        narrow = hit[hit["missing_gap_for_target"] > 0.0].nlargest(NAMED, "annual_probability")
+        gaps = (length_text(gap, results.language) for gap in narrow["gap_for_target"])
+        named = [f"{name} ({gap})" for name, gap in zip(narrow["pair_id"], gaps, strict=True)]
+        steps += [texts["todo_target"].format(names=_names(named))] if named else []
     # One area is no choice
     if len(areas) > 1 and "expected_pounding" in areas:
         most = areas.sort_values("expected_pounding", ascending=False)[:3]

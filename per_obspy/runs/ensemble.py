@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.config import Ensemble, EnsembleScenario, Run, in_language, load
+from per_obspy.config.run import TARGET_RATE
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import content_hash, file_hash, remove_file, temporary_folder, written_whole
 from per_obspy.progress import Progress, silent
@@ -41,6 +42,7 @@ from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.report import report_ensemble
 from per_obspy.runs.run import run
 from per_obspy.runs.scenario_runs import ScenarioRun, ScenarioRuns
+from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.ensemble import (
     SAME,
     SEVERITY,
@@ -48,6 +50,9 @@ from per_obspy.screening.ensemble import (
     ensemble_rejections,
     ensemble_rows,
 )
+
+#: Columns of a pair in each scenario, NaN where an earlier version made its table without them.
+OF_SCENARIO = ("probability", *SEVERITY, *DEMAND_SHARES)
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
@@ -61,6 +66,8 @@ class Scenarios(NamedTuple):
     weights: dict[str, float]
     #: Whether they are rates.
     yearly: bool
+    #: Annual rate of contact that is accepted, 1/year.
+    target_rate: float = TARGET_RATE
 
 
 #: The rows in their order, with the rank before the other columns.
@@ -125,19 +132,19 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
-    zeros = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
+    zeros = ", ".join(f"0::DOUBLE AS {name}" for name in (*SAME, *OF_SCENARIO))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
-    names = ", ".join(("pair_id", "configuration", "probability", *SAME, *SEVERITY))
-    rows += [
-        f"SELECT {number} AS scenario, {names} FROM table{number}"
-        for number, table in enumerate(tables)
-        if table
-    ]
+    for number, table in enumerate(tables):
+        if table:
+            lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
+            wanted = ("pair_id", "configuration", *SAME, *OF_SCENARIO)
+            names = ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
+            rows.append(f"SELECT {number} AS scenario, {names} FROM table{number}")
     # Columns of probability and severity per scenario, extremes of columns that should be equal
     columns = [
         f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
         for number in range(len(tables))
-        for name in ("probability", *SEVERITY)
+        for name in OF_SCENARIO
     ]
     columns += [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
     columns.append("max(configuration) AS configuration")
@@ -153,7 +160,7 @@ def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
     """Yield the joined rows in pieces, with the names of the scenarios."""
     names = {}
     for number, name in enumerate(scenarios.tables):
-        for column in ("probability", *SEVERITY):
+        for column in OF_SCENARIO:
             names[f"{column}_{number}"] = f"{column}_{name}"
     with pq.ParquetFile(joined, pre_buffer=False) as table:
         for batch in table.iter_batches(ROWS):
@@ -170,7 +177,7 @@ def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
     schema = pa.schema(fields)
     with pq.ParquetWriter(path, schema) as writer:
         for piece in _pieces(scenarios, joined):
-            rows = ensemble_rows(piece, scenarios.weights, scenarios.yearly)
+            rows = ensemble_rows(piece, scenarios.weights, scenarios.yearly, scenarios.target_rate)
             writer.write_table(pa.Table.from_pandas(rows, schema=schema, preserve_index=False))
 
 
@@ -257,7 +264,7 @@ def _joined(
         name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
         for name, one in runs.items()
     }
-    scenarios = Scenarios(tables, settings.weights, settings.yearly)
+    scenarios = Scenarios(tables, settings.weights, settings.yearly, settings.target_rate)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
     # Results of the runs know buildings, stations and records
     scenarios_run = {

@@ -33,7 +33,7 @@ from per_obspy.report.pair_figure import differing_pair
 from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.statements import event_sentences
 from per_obspy.report.tally import PAGE_PAIRS
-from per_obspy.report.texts import LANGUAGES, marks
+from per_obspy.report.texts import LANGUAGES, marks, written
 from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
@@ -271,9 +271,11 @@ def report_design(
     # The spectrum replaces the earthquake
     classes, language = list(settings.screening.classes), settings.report.language
     texts, spectrum = LANGUAGES[language], name_text(settings.spectrum.name)
-    region = _region(texts["spectrum_title"].format(name=spectrum), classes, simulated=False)
+    kind = "hazard" if "gap_for_target" in table else "spectrum"
+    region = _region(texts[f"{kind}_title"].format(name=spectrum), classes, simulated=False)
+    source = texts[kind].format(name=spectrum, years=_target_years(settings))
     results = Results(
-        "design", region, coverage, language, Revision(), [texts["spectrum"].format(name=spectrum)],
+        "design", region, coverage, language, Revision(), [source],
         own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
         provenance=_made_of(texts, "page_design"),
     )  # fmt: skip
@@ -285,8 +287,10 @@ def report_design(
     return report
 
 
-def _draw_gaps(settings: Design, table: pd.DataFrame, folder: Path, report: Report) -> None:
-    """Draw the gaps for the target rate of a hazard."""
+def _draw_gaps(
+    settings: Design | Ensemble, table: pd.DataFrame, folder: Path, report: Report
+) -> None:
+    """Draw the gaps for the target rate."""
     figure = folder / "figures" / "gap_for_target.png"
     with report.tried(figure):
         draw_gaps_for_target(table, settings.target_rate, figure)
@@ -343,6 +347,9 @@ def report_ensemble(
     pieces = (_with_classes(piece, limits) for piece in runs.pieces(table))
     pairs = _pair_table(settings, pieces, coverage.screened, runs.totals(), runs.outlines())
     write_report(results, pairs, folder, report)
+    if settings.yearly:
+        gaps = pd.read_parquet(table, columns=["gap", "gap_for_target", "annual_probability"])
+        _draw_gaps(settings, gaps, folder, report)
     return report
 
 
@@ -363,7 +370,13 @@ def _scenario_sentences(settings: Ensemble) -> list[str]:
     return [
         texts["scenarios"].format(count=len(settings.weights)),
         *(sentence.format(name=name_text(name), value=value) for (name, _), value in named),
+        *([texts["target"].format(years=_target_years(settings))] if settings.yearly else []),
     ]
+
+
+def _target_years(settings: Design | Ensemble) -> str:
+    """Return the mean time between two contacts that are accepted."""
+    return written(1.0 / settings.target_rate, 0, settings.report.language)
 
 
 def _region(

@@ -29,6 +29,11 @@ def _per_building(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
     return first, second
 
 
+#: Columns of quantiles of the demand, and the share of outcomes that does not exceed each. The gap
+#: with a chance of contact from 0.9 to 0.02 follows from them: against all nodes of 600 pairs its
+#: error is 4 % (root mean square), in 99 of 100 at most 16 %.
+DEMAND_SHARES = {f"demand_{share:02d}": share / 100.0 for share in (2, 10, 25, 50, 75, 90, 98)}
+
 #: Columns that the risk table adds to the completed pair table.
 RESULTS: dict[str, Column] = {
     column.name: column
@@ -104,6 +109,15 @@ RESULTS: dict[str, Column] = {
             "estimate_over_exact",
             "1",
             "demand_estimated / demand_exact; empty where demand_exact is empty",
+        ),
+        *(
+            _number(
+                name,
+                "m",
+                f"demand that {share:.0%} of outcomes do not exceed, over all uncertain"
+                " values but the gap",
+            )
+            for name, share in DEMAND_SHARES.items()
         ),
         _number(
             "demand_ratio",
@@ -276,7 +290,7 @@ ORDER = (
     "estimate_rule", "demand_exact", "estimate_over_exact", "demand_two_sided", "missing_gap",
     "supplemental_damping", "bumper_restitution", "ln_per_ratio_1", "ln_per_ratio_2",
     "ln_per_std_1", "ln_per_std_2", "contact_mass_1", "contact_mass_2", "restitution",
-    "derived",
+    "derived", *DEMAND_SHARES,
 )  # fmt: skip
 
 #: Columns that a seismic hazard gives beside those of a design spectrum.
@@ -305,7 +319,7 @@ HAZARD: dict[str, Column] = {
             "missing_gap_for_target",
             "float64",
             "m",
-            "widening to the gap_for_target; 0 if it is there",
+            "widening to the gap_for_target; 0 if the gap of the table, taken as right, has it",
         ),
     )
 }

@@ -5,11 +5,15 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy.special import ndtr, ndtri
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.config.run import TARGET_RATE
 from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.screening.columns import DEMAND_SHARES, HAZARD
+from per_obspy.screening.population import at_rows
 from per_obspy.screening.values import BoolArray, Both, Columns, IndexArray
 
 
@@ -137,6 +141,14 @@ JOINED = (
 )
 
 
+#: Columns of the gap that a planner asks for; rates are needed.
+GAPS = ("gap_for_target", "missing_gap_for_target")
+
+#: Halvings of the range of gaps from ``SMALLEST`` to ``LARGEST``, m, in which one is searched: the
+#: last step is 1e-6 of the gap.
+HALVINGS, SMALLEST, LARGEST = 24, 1e-4, 100.0
+
+
 def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
     """
     Return the columns of the ensemble table in order, by name.
@@ -153,13 +165,18 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
         meaning = f"of pounding in scenario {name}"
         columns.append(Column(f"probability_{name}", "float64", "1", meaning))
     columns += [(COLUMNS | COMPLETED)[name] for name in SAME]
-    # weights that are no rates leave the yearly probability out
-    return {
-        column.name: column for column in columns if yearly or column.name != "annual_probability"
-    }
+    columns += [HAZARD[name] for name in GAPS]
+    # weights that are no rates leave out what holds in a year
+    of_rates = () if yearly else ("annual_probability", *GAPS)
+    return {column.name: column for column in columns if column.name not in of_rates}
 
 
-def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> pd.DataFrame:
+def ensemble_rows(
+    joined: pd.DataFrame,
+    weights: Mapping[str, float],
+    yearly: bool,
+    target_rate: float = TARGET_RATE,
+) -> pd.DataFrame:
     """
     Compute the probabilities of pairs from their joined scenarios.
 
@@ -172,7 +189,10 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     weights : mapping of str to float
         Weight of each scenario; see :func:`conditional_probability`.
     yearly : bool
-        Whether weights are rates, 1/year: :func:`annual_probability` is a column then.
+        Whether weights are rates, 1/year: :func:`annual_probability` and the gap for the target are
+        columns then; ``joined`` has the columns of ``DEMAND_SHARES`` of each scenario.
+    target_rate : float
+        Annual rate of contact that is accepted, 1/year.
 
     Returns
     -------
@@ -190,6 +210,11 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     columns: Columns = {"probability": conditional_probability(pounding, weight)}
     if yearly:
         columns["annual_probability"] = annual_probability(pounding, weight)
+        quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
+        demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
+        needed = gap_for_rate(demands, weight, target_rate)
+        missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
+        columns |= dict(zip(GAPS, (needed, missing), strict=True))
     for severity, (name, unknown) in zip(severities, SEVERITY.items(), strict=True):
         beyond = np.nan_to_num(severity - unknown)
         columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
@@ -197,6 +222,45 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
     return rows.assign(**columns)[names]
+
+
+def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatArray:
+    """
+    Return the gap at which the annual rate of contact falls to a target.
+
+    Parameters
+    ----------
+    demands : (n_scenarios, n_shares, n_pairs) array_like
+        Demands that the shares of ``DEMAND_SHARES`` do not exceed in each scenario, m, rising.
+        Between them, and beyond, the logarithm of the demand is linear in the normal score of the
+        share.
+    rates : (n_scenarios,) or (n_scenarios, n_pairs) array_like
+        Rate of each scenario, 1/year.
+    target : float
+        Annual rate of contact, 1/year.
+
+    Returns
+    -------
+    gap : (n_pairs,) ndarray
+        m; 0 where contact is rarer without a gap, NaN where a demand is.
+    """
+    ln_demand, rate = np.log(np.asarray(demands, dtype=np.float64)), np.asarray(rates)
+    scores = ndtri([*DEMAND_SHARES.values()])[:, None] + np.zeros(ln_demand.shape[1:])
+
+    def contact_rate(ln_gap: FloatArray) -> FloatArray:
+        """Return the annual rate of contact at one gap per pair."""
+        shares = np.array([ndtr(-at_rows(one, scores, ln_gap)) for one in ln_demand])
+        return _weighted_sum(shares, rate)
+
+    # The rate falls as the gap grows
+    low, high = np.full((2, ln_demand.shape[2]), np.log([[SMALLEST], [LARGEST]]))
+    is_enough = contact_rate(low) <= target
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        above = contact_rate(middle) > target
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    gap = np.where(is_enough, 0.0, np.exp(high))
+    return np.where(np.isnan(ln_demand).any(axis=(0, 1)), np.nan, gap)
 
 
 def _worst(pounding: FloatArray, velocity: FloatArray, *_: FloatArray) -> IndexArray:

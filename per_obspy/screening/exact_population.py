@@ -37,7 +37,6 @@ from per_obspy.screening.exact import (
     record_supports,
 )
 from per_obspy.screening.population import (
-    COLUMNS,
     NODES,
     SAMPLES,
     STRENGTH,
@@ -47,6 +46,7 @@ from per_obspy.screening.population import (
     building_is_uncertain,
     chance_of_contact,
     damping_at_nodes,
+    empty_population,
     estimated_motion,
     estimated_population,
     gap_dispersion,
@@ -152,7 +152,7 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     """
     table = only(table, NEEDED)
     exact = is_exact(table)
-    result: Columns = {name: np.zeros(exact.size) for name in COLUMNS}
+    result = empty_population(exact.size)
     # estimates, which show too which pairs of derived periods may touch
     estimated = np.flatnonzero(~exact)
     if estimated.size:
@@ -228,7 +228,7 @@ def _sampled(block: _Block, count: int) -> Columns:
     certain &= nodes_suffice(few.demand, median_gap(block.table))
     doubtful = ~certain & (count > FIRST_NODES)
     # the others where they may change the probability
-    result: Columns = {name: np.empty(chance.size) for name in COLUMNS}
+    result = empty_population(chance.size)
     for number, mask in ((FIRST_NODES, ~doubtful), (count, doubtful)):
         rows = np.flatnonzero(mask)
         if not rows.size:

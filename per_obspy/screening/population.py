@@ -49,6 +49,7 @@ from per_obspy.kernels.pairs.node_outcomes import (
 )
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.probability import lognormal_dispersion
+from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.station_motion import (
     LogSpectra,
     log_period_and_damping,
@@ -223,7 +224,20 @@ COLUMNS = (
     "expected_impact_velocity",
     "impact_velocity_84",
     "expected_amplification",
+    *DEMAND_SHARES,
 )
+
+
+def empty_population(count: int) -> Columns:
+    """Return ``COLUMNS`` to be filled; single precision is enough for the quantiles of a demand."""
+    return {
+        name: np.zeros(count, np.float32 if name in DEMAND_SHARES else np.float64)
+        for name in COLUMNS
+    }
+
+
+#: Smallest quantile of a demand, m: that of buildings that move as one.
+SMALLEST_QUANTILE = 1e-6
 
 
 class Uncertain(NamedTuple):
@@ -271,7 +285,49 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
     # the lognormal gap has no share of exactly 0, at which any motion is contact
     moving = (uncertain.motion.demand > 0.0).mean(axis=1)
     outcome[0] = np.maximum(outcome[0], one_wall_chance(pairs) * moving)
-    return dict(zip(COLUMNS, outcome, strict=True))
+    quantiles = demand_quantiles(uncertain.motion.demand, uncertain.log_std, nodes)
+    return dict(zip(COLUMNS, [*outcome, *quantiles], strict=True))
+
+
+def demand_quantiles(demands: FloatArray, log_std: FloatArray, nodes: FloatArray) -> FloatArray:
+    """
+    Return the gaps, m, that the shares of ``DEMAND_SHARES`` of a population do not exceed.
+
+    Arguments are those of :func:`chance_of_contact`, and the nodes of the demands; the result is
+    (n_shares, n_pairs).
+    """
+    shares = np.array([*DEMAND_SHARES.values()])
+    outcomes = demands * np.exp(np.outer(log_std, nodes[:, DEMAND]))
+    gaps = np.quantile(outcomes, shares, axis=1, method="hazen")
+    gaps = np.maximum(gaps, SMALLEST_QUANTILE)
+    # The outcomes of nodes are few: the gaps move to where the chance of contact is the wanted one
+    chance = np.array([chance_of_contact(demands, log_std, certain_gap(gap)) for gap in gaps])
+    score = -ndtri(np.clip(chance, 1e-9, 1.0 - 1e-9))
+    wanted = np.broadcast_to(ndtri(shares)[:, None], gaps.shape)
+    moved = np.array([at_rows(score, np.log(gaps), one) for one in wanted])
+    return np.maximum(np.exp(np.maximum.accumulate(moved)), SMALLEST_QUANTILE)
+
+
+def at_rows(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
+    """
+    Interpolate ``y`` at one ``at`` per pair, linear also beyond the ends.
+
+    ``x`` (rising) and ``y`` are (n_points, n_pairs), ``at`` (n_pairs,). Equal values of ``x`` are a
+    step.
+    """
+    x = x + 1e-9 * np.arange(len(x))[:, None]
+    lower = np.clip((x <= at).sum(axis=0) - 1, 0, len(x) - 2)
+    pair = np.arange(at.size)
+    first, last = x[lower, pair], x[lower + 1, pair]
+    share = (at - first) / np.maximum(last - first, 1e-9)
+    value: FloatArray = y[lower, pair] + share * (y[lower + 1, pair] - y[lower, pair])
+    return value
+
+
+def certain_gap(gap: FloatArray) -> Columns:
+    """Return the columns that a chance of contact needs of pairs whose gap, m, is certain."""
+    nothing = np.zeros_like(gap)
+    return {"gap": gap, "gap_std": nothing, "assumed_gap": nothing}
 
 
 def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) -> FloatArray:
@@ -361,7 +417,7 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
     grid.
     """
     count = motion.row.size
-    result: Columns = {name: np.empty(count) for name in COLUMNS}
+    result = empty_population(count)
     size = SAMPLES // len(NODES)
     # blocks bound the memory; a pair does not depend on its block
     for first in range(0, count, size):

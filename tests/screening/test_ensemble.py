@@ -3,14 +3,17 @@
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_less
+from scipy.special import ndtr, ndtri
 
+from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.ensemble import (
     annual_probability,
     conditional_probability,
     ensemble_columns,
     ensemble_rejections,
     ensemble_rows,
+    gap_for_rate,
 )
 
 
@@ -142,3 +145,37 @@ def test_wrong_weights_are_named():
         annual_probability([[0.5]], [-1.0])
     with pytest.raises(ValueError, match=r"weights must be one a scenario \(1\), got 2"):
         conditional_probability([[0.5]], [1.0, 1.0])
+
+
+def _lognormal(*medians, log_std=0.4):
+    """Return the quantiles of a lognormal demand of one pair in each scenario."""
+    scores = ndtri([*DEMAND_SHARES.values()])
+    return np.exp(np.log(medians)[:, None] + log_std * scores)[:, :, None]
+
+
+def test_the_gap_for_a_rate_of_lognormal_demands():
+    # linear in the normal score: any chance of a lognormal demand is exact, also beyond the shares
+    for chance in (0.999, 0.5, 0.1, 1e-3):
+        gap = gap_for_rate(_lognormal(0.1), [0.02], 0.02 * chance)
+        assert_allclose(gap, 0.1 * np.exp(-0.4 * ndtri(chance)), rtol=2e-6)
+    # the gap has the rate, and its own annual rate gives a gap back
+    demands, rates = _lognormal(0.03, 0.2), np.array([0.02, 0.002])
+    own = rates @ ndtr(np.log(np.array([0.03, 0.2]) / 0.05) / 0.4)
+    assert_allclose(gap_for_rate(demands, rates, own), 0.05, rtol=2e-6)
+    # two scenarios of half the rate are one, in any order; a rarer contact needs a wider gap
+    twice = np.concatenate([demands, demands[::-1]])
+    halves = np.concatenate([rates, rates[::-1]]) / 2
+    assert_allclose(gap_for_rate(twice, halves, own), 0.05, rtol=2e-6)
+    targets = (0.01, 0.003, 0.001, 1e-4)
+    assert_array_less(0.0, np.diff([gap_for_rate(demands, rates, one)[0] for one in targets]))
+
+
+def test_certain_demands_of_one_another_and_none():
+    # without uncertainty a gap as wide as the demand suffices; of two scenarios the one that makes
+    # the rate decides
+    certain = np.repeat(np.array([0.05, 0.3])[:, None], len(DEMAND_SHARES), axis=1)[:, :, None]
+    assert_allclose(gap_for_rate(certain, [0.02, 0.001], 0.002), 0.05, rtol=2e-6)
+    assert_allclose(gap_for_rate(certain, [0.02, 0.001], 0.0005), 0.3, rtol=2e-6)
+    # rarer than the target without a gap, and unknown
+    assert gap_for_rate(certain, [0.001, 0.001], 0.002) == 0.0
+    assert np.isnan(gap_for_rate(certain * [[[1.0]], [[np.nan]]], [0.02, 0.001], 0.0005))

@@ -3,11 +3,19 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import ndtri
 from screening_samples import make_pairs, make_station
 
 import per_obspy
 from per_obspy.screening import population
-from per_obspy.screening.population import COLUMNS, ONE_WALL
+from per_obspy.screening.columns import DEMAND_SHARES
+from per_obspy.screening.population import (
+    COLUMNS,
+    ONE_WALL,
+    certain_gap,
+    chance_of_contact,
+    demand_quantiles,
+)
 
 #: Two buildings at the station itself, where the motion is the record's.
 AT_STATION = {"longitude_1": 19.9999, "longitude_2": 20.0001}
@@ -181,3 +189,21 @@ def test_most_of_the_touching_outlines_are_one_wall(way):
     # as the surveys of touching outlines have it
     assert 0.7 <= ONE_WALL <= 0.99
     assert table["state"].tolist() == ["likely", "no"]
+
+
+def test_quantiles_of_the_demand_have_their_chance_of_contact():
+    # nodes of two groups of buildings, which no lognormal demand is; would catch quantiles of the
+    # nodes alone, which leave out that each is uncertain
+    nodes, shares = population.NODES, np.array([*DEMAND_SHARES.values()])
+    demands = np.where(nodes[:, 0] > 0.5, 0.2, 0.05) * np.exp(0.2 * nodes[:, 2])
+    demands, log_std = np.stack([demands, 3.0 * demands]), np.full(2, 0.3)
+    quantiles = demand_quantiles(demands, log_std, nodes)
+    for gap, share in zip(quantiles, shares, strict=True):
+        chance = chance_of_contact(demands, log_std, certain_gap(gap))
+        # one step of linear interpolation between outcomes of 128 nodes
+        assert_allclose(chance, 1.0 - share, atol=0.02)
+    assert_allclose(quantiles[:, 1], 3.0 * quantiles[:, 0], rtol=1e-9)
+    # one node is lognormal; a certain demand is each of its quantiles
+    one = demand_quantiles(np.full((2, 1), 0.1), np.array([0.3, 0.0]), nodes)
+    assert_allclose(one[:, 0], 0.1 * np.exp(0.3 * ndtri(shares)), rtol=1e-6)
+    assert_allclose(one[:, 1], 0.1, rtol=1e-8)

@@ -59,6 +59,7 @@ PAIR_KINDS = {
     "per_2": "number", "sd_1": "number", "sd_2": "number", "period_log_std_1": "number",
     "period_log_std_2": "number", "supplemental_damping": "number",
     "bumper_restitution": "number", "prevention_kind": "choice", "worst_scenario": "choice",
+    "annual_probability": "number", "gap_for_target": "number",
 }  # fmt: skip
 
 #: Largest and smallest probability below 1 and above 0 that single precision keeps apart from them.

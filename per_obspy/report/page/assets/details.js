@@ -49,6 +49,8 @@ class Details {
         high: number(this.value("impact_velocity_84", i)),
       }));
     }
+    if (known("annual_probability")) said.push(t("says_annual", { value: number(100 * this.value("annual_probability", i)) }));
+    if (known("gap_for_target")) said.push(t("says_target", { value: this.centimetres("gap_for_target", i) }));
     const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
     said.push(gap);
     if (known("demand")) said.push(t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));

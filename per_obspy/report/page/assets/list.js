@@ -6,8 +6,8 @@ const PAGE_ROWS = 100;
 // Columns of the table, with the factor to the unit of their heading and their decimals, if they have more than two digits
 const LISTED = [
   ["rank", 1, 0], ["pair_id"], ["risk_class"], ["state"], ["probability", 100, 0],
-  ["expected_impact_velocity", 1], ["gap", 100, 1], ["demand", 100, 1],
-  ["missing_gap", 100, 1], ["expected_amplification", 1], ["station"],
+  ["expected_impact_velocity", 1], ["gap", 100, 1], ["annual_probability", 100], ["gap_for_target", 100, 1],
+  ["demand", 100, 1], ["missing_gap", 100, 1], ["expected_amplification", 1], ["station"],
 ];
 
 class PairList {
