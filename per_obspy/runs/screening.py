@@ -13,6 +13,7 @@ from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
+from per_obspy.inventory.schema import AFTER_DAMAGE
 from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.coverage import Coverage, CoverageTally
@@ -25,6 +26,7 @@ from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.record import Served
 from per_obspy.runs.stations import simulated_motion
 from per_obspy.runs.tasks.chunk import CHUNK, ChunkTask
+from per_obspy.runs.tasks.earlier_result import earlier_result
 from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
 from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
@@ -114,17 +116,18 @@ def screened(
     # Pairs need a station, amplitudes of one, or a map
     screens = _parts if stations or ground.amplitudes or ground.shakemap else _no_parts
     parts, notes, tally = screens(context, ground)
-    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    states, served, damage, rows = Counter[str](), Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     if any(part.path for part in parts):
         facts = _facts(settings, stations)
-        files, states, served = _ranked(context, parts, facts)
+        files, states, served, damage = _ranked(context, parts, facts)
         # Rows of buildings are read from it
         rows = building_rows(context, ground, facts)
         outputs += files + rows.outputs
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
+    counts |= {f"after_damage_{word}": damage[word] for word in AFTER_DAMAGE if settings.after}
     return Screened(
         outputs,
         counts,
@@ -258,6 +261,7 @@ def _tasks(
     raw: dict[int, RawRows],
 ) -> Iterator[ChunkTask]:
     """Yield one task per chunk of the inventory, and keep its rows until it is done."""
+    after = earlier_result(settings)
     for number, chunk in enumerate(chunks):
         raw[number] = chunk.rows
         part = _chunk_folder(folder) / f"{number:06}.parquet"
@@ -268,6 +272,7 @@ def _tasks(
             ground=ground,
             building=settings.building,
             screening=settings.screening,
+            after=after,
         )
 
 
