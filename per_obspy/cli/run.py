@@ -341,7 +341,7 @@ def _print_counts(record: dict[str, Any]) -> None:
     if "after_damage_unknown" in counts:
         left, unknown = counts["after_damage_residual"], counts["after_damage_unknown"]
         line = f"{left} pairs start from the gap that the earlier earthquake left"
-        print(f"{line}, of {unknown} its damage is unknown")
+        print(f"{line}; the damage of {unknown} is unknown")
     if people := counts.get("intensities_left_out", 0):
         print(f"{people} intensities that people reported are left out")
 

@@ -77,7 +77,8 @@ def pairs_after(pairs: pd.DataFrame, earlier: pd.DataFrame, code_level: CodeLeve
     -----
     * The deviation of a residual displacement is itself or, if larger, that of FEMA P-58 at the
       ductility that 16 of 100 exceed: 0 up to yield, 0.3 times the displacement beyond yield up to
-      a ductility of 4, and the displacement less 3 yield displacements from there on.
+      a ductility of 4, and the displacement less 3 yield displacements from there on. Buildings
+      that lean on each other touch: their gap of 0 is as certain as the gap was.
     * A gap that differs from that of the earlier earthquake was measured since, and stays, unless
       the table says that it is assumed or learned from images.
     * Pairs that the earlier earthquake did not screen are ``unknown``.
@@ -96,11 +97,12 @@ def pairs_after(pairs: pd.DataFrame, earlier: pd.DataFrame, code_level: CodeLeve
     followed = is_same & np.isfinite(residual) & np.isfinite(before)
     moved = (np.abs(residual - was_given) > SAME_GAP) | (added > SAME_GAP) | np.isfinite(replaced)
     starts = followed & moved & ~_measured(pairs, gap, before)
-    spread = np.minimum(np.hypot(numbers_in(rows, "gap_std"), added), LARGEST_STD)
+    # What leans on each other touches, whatever the residuals
+    spread = np.hypot(numbers_in(rows, "gap_std"), np.where(residual > 0.0, added, 0.0))
     unknown = ~is_same | _may_be_damaged(rows, followed, code_level)
     return pairs.assign(
         gap=np.where(starts, np.minimum(residual, WIDEST), gap),
-        gap_std=np.where(starts, spread, numbers_in(pairs, "gap_std")),
+        gap_std=np.where(starts, np.minimum(spread, LARGEST_STD), numbers_in(pairs, "gap_std")),
         gap_before=np.where(starts, before, np.nan),
         after_damage=np.where(unknown, UNKNOWN, np.where(starts, RESIDUAL, "")),
     )
