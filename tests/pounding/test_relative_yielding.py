@@ -94,6 +94,7 @@ def test_radii_and_displacements_are_those_of_single_oscillators(ground, pairs, 
                 found.displacement_maxima[i - 1, index], alone.displacement_maximum, rtol=1e-8
             )
             assert_allclose(found.per[i - 1, index], alone.displacement_radius, rtol=1e-8)
+            assert_allclose(found.residual[i - 1, index], alone.residual, rtol=1e-6, atol=1e-12)
 
 
 def test_against_sampled_differences_of_single_histories(ground, pairs, strength):
