@@ -18,7 +18,7 @@ from per_obspy.progress import Progress
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.file_list import input_files
 from per_obspy.results.ranked_table import table_files
-from per_obspy.runs.inputs.drawn_pairs import layer_files
+from per_obspy.runs.inputs.drawn_pairs import footprint_files
 from per_obspy.runs.inputs.extras import require_extras
 from per_obspy.runs.tasks.parallel import Workers
 
@@ -187,7 +187,7 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs is None or pairs.simulated is not None:
         return []
     if pairs.footprints is not None:
-        return layer_files(pairs.footprints.file)
+        return footprint_files(pairs.footprints)
     if pairs.catalog is None:
         # A file next to the table may describe how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []
