@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import pyarrow.parquet as pq
 
-from per_obspy.config import Run
+from per_obspy.config import Records, Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
 from per_obspy.inventory.schema import AFTER_DAMAGE
 from per_obspy.records.earthquakes.quakeml import read_event_file
+from per_obspy.records.shakemap import map_event
 from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.coverage import Coverage, CoverageTally
 from per_obspy.results.risk import RiskFiles, write_risk
@@ -32,7 +33,7 @@ from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 from per_obspy.runs.tasks.station import FinishedStation, hypocentre_attributes
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.site_motion import hypocentre_of
+from per_obspy.screening.site_motion import Hypocentre, hypocentre_of
 from per_obspy.screening.station_amplitudes import AmplitudeField
 
 #: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
@@ -182,15 +183,23 @@ def ground_of_run(
     """Return the ground motion of a run, and the stations of which nothing is used."""
     records = settings.records
     listed = records.stationlist if records else None
-    # The hypocentre, where no record has it
-    event = read_event_file(records.event) if records and records.event and listed else None
     return ground_files(
         stations,
         shakemap_files(settings),
         settings.screening.interpolation,
         listed,
-        hypocentre_of([hypocentre_attributes(event)]),
+        _described_hypocentre(records) if records and listed else None,
     )
+
+
+def _described_hypocentre(records: Records) -> Hypocentre | None:
+    """Return the hypocentre by the event or the map of a configuration, for want of records."""
+    event = read_event_file(records.event) if records.event else None
+    if found := hypocentre_of([hypocentre_attributes(event)]):
+        return found
+    facts = map_event(records.shakemap) if records.shakemap else {}
+    place = [value for name in Hypocentre._fields if isinstance(value := facts.get(name), float)]
+    return Hypocentre(*place) if len(place) == len(Hypocentre._fields) else None
 
 
 def shakemap_files(settings: Run) -> tuple[Path, ...]:
