@@ -226,15 +226,16 @@ def _fetched(box: "Box | None", output: Path) -> Path:
 
 def parsed_box(text: str) -> "Box":
     """Return west, south, east and north of an option, degrees."""
+    from per_obspy.config.pairs import box_of
+
     try:
-        west, south, east, north = map(float, text.split(","))
+        numbers = tuple(map(float, text.split(",")))
     except ValueError:
-        west = east = south = north = 0.0
-    # NaN is not within any limit
-    if not (-180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0):
-        problem = f"{text!r} is not W,S,E,N in degrees with W < E (not across 180) and S < N"
-        raise typer.BadParameter(problem, param_hint="--bbox")
-    return west, south, east, north
+        numbers = ()
+    try:
+        return box_of(repr(text), numbers)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--bbox") from error
 
 
 def _named_columns(options: "Sequence[str]") -> dict[str, str]:

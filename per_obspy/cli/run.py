@@ -105,6 +105,10 @@ def run(
     ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     changes: Changes = None,
+    after: Annotated[
+        Path | None,
+        typer.Option(help="Results of an earlier earthquake, whose damage the pairs have."),
+    ] = None,
     dask: Dask = None,
     language: Language = None,
     strict: Strict = False,
@@ -132,6 +136,7 @@ def run(
     for name in (first, first if second is None else second):
         named_path(name)
     spoken = [f"report.language={language}"] if language else []
+    spoken += [f"after={json.dumps(str(after))}"] if after else []
     with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
         asked = requested_run(first, second, output, [*(changes or ()), *spoken])
         if asked.line and not quiet:
@@ -333,6 +338,10 @@ def _print_counts(record: dict[str, Any]) -> None:
     others = f" and {alone} with amplitudes only" if alone else ""
     stations = f"{counts['stations']} stations{others}"
     print(f"{stations}, {counts['pairs']} pairs: {states}; {rejected} rejected")
+    if "after_damage_unknown" in counts:
+        left, unknown = counts["after_damage_residual"], counts["after_damage_unknown"]
+        line = f"{left} pairs start from the gap that the earlier earthquake left"
+        print(f"{line}; the damage of {unknown} is unknown")
     if people := counts.get("intensities_left_out", 0):
         print(f"{people} intensities that people reported are left out")
 

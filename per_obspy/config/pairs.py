@@ -1,7 +1,7 @@
 """Pairs of a run: tables, simulated inventories and rows of buildings."""
 
 from datetime import datetime
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     Field,
@@ -150,6 +150,20 @@ class TableForm(Section):
     )
 
 
+def box_of(text: str, box: tuple[float, ...]) -> tuple[float, float, float, float]:
+    """Return west, south, east and north, degrees; ``ValueError`` quotes the text of others."""
+    if len(box) == 4:
+        west, south, east, north = box
+        # NaN is not within any limit
+        if -180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0:
+            return west, south, east, north
+    raise ValueError(f"{text} is not W,S,E,N in degrees with W < E (not across 180) and S < N")
+
+
+#: Longitude, or latitude.
+Degrees = Annotated[float, Field(ge=-180, le=180)]
+
+
 class Footprints(Section):
     """Outlines of buildings, of which neighbours are the pairs."""
 
@@ -172,6 +186,27 @@ class Footprints(Section):
             'columns of the layer: quantity of a building = "column", such as height = "altura"'
         ),
     )
+    bbox: tuple[Degrees, Degrees, Degrees, Degrees] | None = Field(
+        None,
+        description=(
+            "box [W, S, E, N], degrees: only buildings that touch it, of GeoParquet with a column "
+            "bbox"
+        ),
+    )
+    heights: RelativePath | None = Field(
+        None,
+        description=(
+            "GeoTIFF of heights above ground, m, for buildings without height, storeys and period; "
+            "needs per_obspy[raster]"
+        ),
+    )
+
+    @field_validator("bbox")
+    @classmethod
+    def _a_box(
+        cls, bbox: tuple[float, float, float, float] | None
+    ) -> tuple[float, float, float, float] | None:
+        return bbox and box_of(str(list(bbox)), bbox)
 
 
 class Pairs(TableForm):

@@ -28,6 +28,11 @@ class Run(Section):
     )
     records: Records | None = Field(None, description="sources of the records")
     pairs: Pairs | None = Field(None, description="source of the pairs, if not the simulation")
+    after: RelativePath | None = Field(
+        None,
+        description="results of an earlier earthquake on the same pairs, from which the gaps start "
+        "that its histories left; pairs whose damage nobody knows are never no",
+    )
     processing: Processing = Processing()
     spectra: Spectra = Spectra()
     building: Building = Building()

@@ -110,6 +110,13 @@ class Watch(Section):
         le=315_360_000,
         description="age of an earthquake beyond which it is neither opened nor polled, s",
     )
+    aftershocks: bool = Field(
+        False,
+        description=(
+            "start an earthquake within the time and distance of an earlier one (Gardner & "
+            "Knopoff 1974) from the damage that its newest results show"
+        ),
+    )
     updatedafter: bool = Field(
         True, description="request only earthquakes that changed since the last poll"
     )

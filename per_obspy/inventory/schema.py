@@ -30,6 +30,9 @@ POSITIONS = ("end", "inside")
 #: gap between outlines that were learned from images.
 DEVIATION_SOURCES = ("given", "assumed", "learned")
 
+#: What an earlier earthquake did to a pair: its gap is what the history left, or nobody knows.
+AFTER_DAMAGE = ("residual", "unknown")
+
 #: Whether both buildings are within one property.
 ONE_PROPERTY = ("yes", "no")
 
@@ -91,6 +94,13 @@ _PAIR = (
     Column("gap_std_source", "str", "",
            "whether gap_std is given, assumed, or that of outlines learned from images",
            choices=DEVIATION_SOURCES),
+    Column("gap_before", "float64", "m",
+           "gap before an earlier earthquake, whose history left the gap of the row",
+           low=0.0, high=10.0),
+    Column("after_damage", "str", "",
+           "residual: the gap is what the history of an earlier earthquake left; unknown: an "
+           "earlier earthquake may have damaged the pair in a way that no history followed",
+           choices=AFTER_DAMAGE),
     Column("azimuth", "float64", "degrees",
            "direction from building 1 to building 2, clockwise from north", low=0.0, high=360.0),
     Column("contact_height", "float64", "m", "height at which the buildings meet first",

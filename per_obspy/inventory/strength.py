@@ -75,6 +75,19 @@ def hazus_yield_displacement(
     return np.asarray(acceleration * (np.asarray(period) / (2.0 * np.pi)) ** 2)
 
 
+def least_yield_displacement(
+    period: ArrayLike, storeys: ArrayLike, code_level: CodeLevel
+) -> FloatArray:
+    """Return the least yield displacement, m, of any system by HAZUS; of any height if unknown."""
+    accelerations = np.array([capacities[0] for capacities in _CAPACITIES.values()])
+    # Low-, mid- or high-rise, and any of them for storeys that are NaN
+    least = np.append(accelerations.min(axis=0), accelerations.min())
+    count = np.asarray(storeys, dtype=np.float64)
+    rise = np.searchsorted([MID_RISE, HIGH_RISE], count, side="right")
+    lowest = CODE_LEVELS[code_level] * STANDARD_GRAVITY * least[np.where(np.isnan(count), 3, rise)]
+    return np.asarray(lowest * (np.asarray(period) / (2.0 * np.pi)) ** 2)
+
+
 def hazus_hardening(system: ArrayLike, storeys: ArrayLike) -> FloatArray:
     """Return the stiffness after yield over that before by HAZUS; NaN as the displacement."""
     return _of_class(system, storeys, 1)

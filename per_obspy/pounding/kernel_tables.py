@@ -281,6 +281,13 @@ def run_pairs(
     return rows, run_blocks(kernel, lane_rows, components, dt, rows, *steps)
 
 
+def rest_displacements(rows: FloatArray) -> FloatArray:
+    """Return where structures of rows of pairs come to rest after their motion, (2, n_pairs), m."""
+    # Where the elastic force (1 - hardening) omega² (u - plastic) + hardening omega² u is zero
+    rest: FloatArray = (1.0 - rows[:, :, columns.HARDENING]) * rows[:, :, columns.PLASTIC]
+    return rest.T
+
+
 def run_blocks(
     kernel: Callable[..., bool],
     lane_rows: int,

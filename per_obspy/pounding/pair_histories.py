@@ -12,7 +12,12 @@ from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
-from per_obspy.pounding.kernel_tables import closed_record, ground_motion, run_pairs
+from per_obspy.pounding.kernel_tables import (
+    closed_record,
+    ground_motion,
+    rest_displacements,
+    run_pairs,
+)
 from per_obspy.pounding.structure import Pairs
 from per_obspy.spectra.trace_arguments import takes_trace
 
@@ -34,12 +39,16 @@ class PoundingMaxima(NamedTuple):
         they meet at all is ``impact_velocity > 0``.
     impact_velocity : (n_pairs,) ndarray
         Largest approach speed of an impact, m/s; 0 without impact.
+    residual : (2, n_pairs) ndarray
+        Displacement at which both structures come to rest, m; 0 for linear ones. Where the second
+        less the first is below minus the gap, they rest against each other.
     """
 
     per: FloatArray
     displacement_maxima: FloatArray
     impacts: NDArray[np.int64]
     impact_velocity: FloatArray
+    residual: FloatArray
 
 
 @takes_trace
@@ -159,4 +168,5 @@ def pounding_histories(
         displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
         impacts=impacts.reshape(pairs.shape),
         impact_velocity=rows[:, 0, columns.APPROACH].reshape(pairs.shape),
+        residual=rest_displacements(rows).reshape(2, *pairs.shape),
     )

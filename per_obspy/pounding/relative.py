@@ -18,6 +18,7 @@ from per_obspy.pounding.kernel_tables import (
     both_components,
     closed_record,
     ground_motion,
+    rest_displacements,
     run_pairs,
 )
 from per_obspy.pounding.structure import Pairs
@@ -339,6 +340,8 @@ class YieldingRelativeDisplacement(NamedTuple):
         Largest radius ``sqrt(u² + (v / omega)²)`` of both structures at contact level, m.
     displacement_maxima : (2, n_pairs) ndarray
         Largest displacement to either side at contact level, m.
+    residual : (2, n_pairs) ndarray
+        Displacement at contact level at which both structures come to rest, m.
     """
 
     one_before_two: FloatArray
@@ -346,6 +349,7 @@ class YieldingRelativeDisplacement(NamedTuple):
     largest: FloatArray
     per: FloatArray
     displacement_maxima: FloatArray
+    residual: FloatArray
 
 
 def yielding_relative_displacement(
@@ -439,4 +443,5 @@ def yielding_relative_displacement(
         largest=openings.max(axis=0),
         per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
         displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
+        residual=rest_displacements(rows).reshape(2, *pairs.shape),
     )

@@ -13,7 +13,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from per_obspy.constants import STANDARD_GRAVITY
+import numpy as np
+
+from per_obspy.constants import EARTH_RADIUS, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, Rejection, reason_of, shortened
 from per_obspy.names import SHOWN, code_problem
 
@@ -39,6 +41,12 @@ _LARGEST_DISPLACEMENT = 20.0
 
 #: Flags of an amplitude without a doubt of the agency.
 _NO_DOUBT = ("", "0", "None", "null")
+
+#: Distances by which a hypocentre is found; how far they may be off, and its depth, m; the largest
+#: hypocentral distance that counts, km: that of a chord is shorter far away.
+FEWEST_DISTANCES, SAME_DISTANCE, DEEPEST, FURTHEST = 5, 1000.0, 700_000.0, 1000.0
+#: Square of a direction less 1 that is rounding: 1 km beside a line of stations.
+ON_SURFACE = 2e-8
 
 #: Endings and names of vertical channels.
 _VERTICAL = re.compile(r".*Z|V|U|D|UP|UD|DOWN|VER(T|TICAL)?", re.IGNORECASE)
@@ -95,11 +103,15 @@ class StationList(NamedTuple):
         Stations that cannot be used, with their reasons.
     intensities : int
         Number of intensities that people reported, which are left out.
+    hypocentre : tuple of float or None
+        Longitude and latitude, degrees, and depth, m, from which the list counts the distances of
+        its stations; None where these are missing or contradict each other.
     """
 
     stations: tuple[StationAmplitudes, ...]
     rejected: tuple[Rejection, ...]
     intensities: int
+    hypocentre: tuple[float, float, float] | None = None
 
 
 def read_station_list(path: Path) -> StationList:
@@ -117,7 +129,8 @@ def read_station_list(path: Path) -> StationList:
         If the file cannot be read or is no list of stations.
     """
     stations, rejected, intensities = dict[str, StationAmplitudes](), list[Rejection](), 0
-    for number, feature in enumerate(_features(path), start=1):
+    features = _features(path)
+    for number, feature in enumerate(features, start=1):
         # Anything may stand in the place of a station
         facts = feature.get("properties") if isinstance(feature, dict) else None
         facts = facts if isinstance(facts, dict) else {}
@@ -131,7 +144,46 @@ def read_station_list(path: Path) -> StationList:
             stations[name] = _named_station(name, codes, feature, facts, name in stations)
         except ValueError as error:
             rejected.append(Rejection("record", name, str(path), None, (shortened(str(error)),)))
-    return StationList(tuple(stations.values()), tuple(rejected), intensities)
+    found = tuple(stations.values()), tuple(rejected), intensities
+    return StationList(*found, _hypocentre(features))
+
+
+def _hypocentre(features: list[Any]) -> tuple[float, float, float] | None:
+    """
+    Return the point from which a list counts its distances; it does not name it otherwise.
+
+    The cosine of a distance in radii of the Earth is linear in the direction to the epicentre.
+    """
+    rows = np.array([row for row in map(_distances, features) if row]).reshape(-1, 4)
+    if len(rows) < FEWEST_DISTANCES:
+        return None
+    east, north = np.radians(rows[:, :2].T)
+    places = np.stack(
+        [np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=1
+    )
+    epicentral, hypocentral = 1000.0 * rows[:, 2:].T
+    x, y, z = direction = np.linalg.lstsq(places, np.cos(epicentral / EARTH_RADIUS))[0]
+    # Distances of one point only, to the metre of their digits
+    angles = np.arccos(np.clip(places @ direction, -1.0, 1.0))
+    depths = np.sqrt(np.maximum(hypocentral**2 - epicentral**2, 0.0))
+    depth, away = float(np.median(depths)), np.abs(EARTH_RADIUS * angles - epicentral)
+    # Stations in line leave a point that is inside of the Earth
+    is_surface = abs(x * x + y * y + z * z - 1.0) < ON_SURFACE
+    if not (is_surface and away.max() <= SAME_DISTANCE and depth <= DEEPEST):
+        return None
+    longitude = float(np.degrees(np.arctan2(y, x)))
+    return longitude, float(np.degrees(np.arctan2(z, np.hypot(x, y)))), depth
+
+
+def _distances(feature: Any) -> tuple[float, float, float, float] | None:
+    """Return place, degrees, epicentral and hypocentral distance, km, of a feature that has all."""
+    try:
+        known = feature["properties"]["distances"]
+        row = (*_place(feature), _number(known["repi"]), _number(known["rhypo"]))
+    except (TypeError, KeyError, ValueError):
+        return None
+    # Half around the Earth and more, or none
+    return row if 0.0 <= row[2] <= row[3] <= FURTHEST else None
 
 
 def _named_station(

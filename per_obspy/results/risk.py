@@ -43,6 +43,8 @@ class RiskFiles(NamedTuple):
     states: Counter[str]
     #: Number of pairs for which the record of each station is used.
     stations: Counter[str]
+    #: Number of pairs by what an earlier earthquake did to them, if the table says it.
+    damage: Counter[str]
 
 
 def write_risk(
@@ -76,14 +78,14 @@ def write_risk(
     with written_whole(text) as lines, _opened(parts, folder, whole, cell) as (first, *others):
         rows = _ranked_rows(parts, schema, whole)
         with first as table:
-            states, stations = _write_rows(rows, table, lines, csv_rows)
+            counted = _write_rows(rows, table, lines, csv_rows)
         # More cells than files that can be open together
         for files in others:
             with files as table:
                 for piece in _ranked_rows(parts, schema, whole):
                     table.write_table(piece)
     write_csv(column_table(whole.names), columns)
-    return RiskFiles([*table_files(folder), text, columns], states, stations)
+    return RiskFiles([*table_files(folder), text, columns], *counted)
 
 
 @contextmanager
@@ -112,15 +114,16 @@ def ranked_schema(schema: pa.Schema, facts: Mapping[str, str]) -> pa.Schema:
 
 def _write_rows(
     rows: Iterator[pa.Table], table: pq.ParquetWriter | CellFiles, text: Path, csv_rows: int
-) -> tuple[Counter[str], Counter[str]]:
-    """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
-    states, stations, before = Counter[str](), Counter[str](), 0
+) -> tuple[Counter[str], Counter[str], Counter[str]]:
+    """Write ranked rows as Parquet, the worst as CSV too; count states, stations and damage."""
+    counted = {name: Counter[str]() for name in ("state", "station", "after_damage")}
+    before = 0
     short: list[str] = []
     with bounded_database(text.parent) as database:
         for piece in rows:
             table.write_table(piece)
-            count_values(piece["state"], states)
-            count_values(piece["station"], stations)
+            for name in counted.keys() & set(piece.column_names):
+                count_values(piece[name], counted[name])
             if not before:
                 short = csv_columns(piece.column_names)
                 text.write_text(header(short), encoding="utf-8")
@@ -130,7 +133,7 @@ def _write_rows(
                 worst = piece.select(short).slice(0, csv_rows - before)
                 _append_csv(database, rounded_arrow(worst), text)
             before += piece.num_rows
-    return states, stations
+    return counted["state"], counted["station"], counted["after_damage"]
 
 
 def count_values(column: pa.ChunkedArray, counter: Counter[str]) -> None:

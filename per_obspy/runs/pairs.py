@@ -26,6 +26,7 @@ from per_obspy.records.shakemap import read_shakemap
 from per_obspy.records.station_list import read_station_list
 from per_obspy.report.page.background import require_background
 from per_obspy.runs.inputs.drawn_pairs import pair_table
+from per_obspy.runs.tasks.earlier_result import check_earlier
 from per_obspy.runs.tasks.ground_files import StationFile
 from per_obspy.screening.assignment import nearest_station
 from per_obspy.simulation.buildings import simulated_pairs
@@ -66,7 +67,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
 
 def check_inputs(settings: Run, folder: Path) -> None:
     """
-    Check heads of pair table and background, inventories, area, ShakeMap and station list.
+    Check heads of pair table and background, inventories, area, earlier results, motions.
 
     Parameters
     ----------
@@ -82,6 +83,7 @@ def check_inputs(settings: Run, folder: Path) -> None:
     """
     pairs = settings.pairs
     require_background(settings.report.background)
+    check_earlier(settings, folder)
     table = pair_table(settings, folder)
     if pairs and pairs.footprints and not pairs.footprints.file.is_file():
         raise CatalogError(str(pairs.footprints.file), "no such file")

@@ -17,7 +17,8 @@ from per_obspy.inventory.files.side_file import side_file
 from per_obspy.progress import Progress
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.file_list import input_files
-from per_obspy.runs.inputs.drawn_pairs import layer_files
+from per_obspy.results.ranked_table import table_files
+from per_obspy.runs.inputs.drawn_pairs import footprint_files
 from per_obspy.runs.inputs.extras import require_extras
 from per_obspy.runs.tasks.parallel import Workers
 
@@ -175,6 +176,7 @@ def _values(settings: Run, folder: Path) -> dict[str, Any]:
 def _input_files(settings: Run, fetched: "Fetched | None") -> list[Path]:
     """Return every input file of a run: records and their metadata, scenario and inventory."""
     given = [settings.simulation, settings.report.background, *_inventory_files(settings)]
+    given += table_files(settings.after) if settings.after else []
     files = [path for path in given if path and path.is_file()]
     return [*input_files(settings.records, fetched), *files]
 
@@ -185,7 +187,7 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs is None or pairs.simulated is not None:
         return []
     if pairs.footprints is not None:
-        return layer_files(pairs.footprints.file)
+        return footprint_files(pairs.footprints)
     if pairs.catalog is None:
         # A file next to the table may describe how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []

@@ -9,11 +9,13 @@ from typing import NamedTuple
 
 import pyarrow.parquet as pq
 
-from per_obspy.config import Run
+from per_obspy.config import Records, Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.files.reading import PairChunk, PairInventory
+from per_obspy.inventory.schema import AFTER_DAMAGE
 from per_obspy.records.earthquakes.quakeml import read_event_file
+from per_obspy.records.shakemap import map_event
 from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.coverage import Coverage, CoverageTally
 from per_obspy.results.risk import RiskFiles, write_risk
@@ -25,12 +27,13 @@ from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.record import Served
 from per_obspy.runs.stations import simulated_motion
 from per_obspy.runs.tasks.chunk import CHUNK, ChunkTask
+from per_obspy.runs.tasks.earlier_result import earlier_result
 from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
 from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 from per_obspy.runs.tasks.station import FinishedStation, hypocentre_attributes
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.site_motion import hypocentre_of
+from per_obspy.screening.site_motion import Hypocentre, hypocentre_of
 from per_obspy.screening.station_amplitudes import AmplitudeField
 
 #: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
@@ -114,17 +117,18 @@ def screened(
     # Pairs need a station, amplitudes of one, or a map
     screens = _parts if stations or ground.amplitudes or ground.shakemap else _no_parts
     parts, notes, tally = screens(context, ground)
-    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    states, served, damage, rows = Counter[str](), Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     if any(part.path for part in parts):
         facts = _facts(settings, stations)
-        files, states, served = _ranked(context, parts, facts)
+        files, states, served, damage = _ranked(context, parts, facts)
         # Rows of buildings are read from it
         rows = building_rows(context, ground, facts)
         outputs += files + rows.outputs
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
+    counts |= {f"after_damage_{word}": damage[word] for word in AFTER_DAMAGE if settings.after}
     return Screened(
         outputs,
         counts,
@@ -179,15 +183,23 @@ def ground_of_run(
     """Return the ground motion of a run, and the stations of which nothing is used."""
     records = settings.records
     listed = records.stationlist if records else None
-    # The hypocentre, where no record has it
-    event = read_event_file(records.event) if records and records.event and listed else None
     return ground_files(
         stations,
         shakemap_files(settings),
         settings.screening.interpolation,
         listed,
-        hypocentre_of([hypocentre_attributes(event)]),
+        _described_hypocentre(records) if records and listed else None,
     )
+
+
+def _described_hypocentre(records: Records) -> Hypocentre | None:
+    """Return the hypocentre by the event or the map of a configuration, for want of records."""
+    event = read_event_file(records.event) if records.event else None
+    if found := hypocentre_of([hypocentre_attributes(event)]):
+        return found
+    facts = map_event(records.shakemap) if records.shakemap else {}
+    place = [value for name in Hypocentre._fields if isinstance(value := facts.get(name), float)]
+    return Hypocentre(*place) if len(place) == len(Hypocentre._fields) else None
 
 
 def shakemap_files(settings: Run) -> tuple[Path, ...]:
@@ -258,6 +270,7 @@ def _tasks(
     raw: dict[int, RawRows],
 ) -> Iterator[ChunkTask]:
     """Yield one task per chunk of the inventory, and keep its rows until it is done."""
+    after = earlier_result(settings)
     for number, chunk in enumerate(chunks):
         raw[number] = chunk.rows
         part = _chunk_folder(folder) / f"{number:06}.parquet"
@@ -268,6 +281,7 @@ def _tasks(
             ground=ground,
             building=settings.building,
             screening=settings.screening,
+            after=after,
         )
 
 

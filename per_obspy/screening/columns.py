@@ -225,6 +225,13 @@ RESULTS: dict[str, Column] = {
             "1",
             "ratio of the largest radius with pounding to that without, in the exact history",
         ),
+        *_per_building(
+            "residual",
+            "m",
+            "displacement at contact height at which the exact history leaves it, positive from 1 "
+            "to 2; empty where no building can yield, or the record does not support the pair",
+        ),
+        _number("residual_gap", "m", "gap + residual_2 - residual_1, at least 0"),
         _number("absolute_gap", "m", "sum of the PER of both buildings, at contact height"),
         *_per_building(
             "ln_per_ratio", "1", "ln(PER at the site / PER of the record), at 5 % damping, RotD50"
@@ -280,7 +287,8 @@ ORDER = (
     "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
     "impact_velocity_84", "expected_amplification", "configuration", "weighted_velocity", "gap",
     "demand", "demand_rule", "demand_ratio", "impact_velocity", "impacts", "impact_velocity_exact",
-    "amplification_exact_1", "amplification_exact_2", "single_hit_status", "amplification_1",
+    "amplification_exact_1", "amplification_exact_2", "residual_1", "residual_2", "residual_gap",
+    "single_hit_status", "amplification_1",
     "amplification_2", "flags", "station", "distance", "azimuth_used", "azimuth_rule",
     "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2",
     "per_1", "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per",

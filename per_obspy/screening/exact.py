@@ -45,6 +45,9 @@ EXACT_COLUMNS = (
     "impact_velocity_exact",
     "amplification_exact_1",
     "amplification_exact_2",
+    "residual_1",
+    "residual_2",
+    "residual_gap",
 )
 
 #: Share of the gap below which a demand without contact, known to 1e-9, leaves the pair apart.
@@ -112,14 +115,16 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     ``table`` holds completed pairs with their radii along the azimuth, and ``azimuth_used``.
     Returns ``EXACT_COLUMNS`` and ``azimuth_used``, (n_pairs,), see ``columns.RESULTS``.
     """
-    towards, away, *radii = _without_contact(station, table, azimuth)
+    towards, away, *others = _without_contact(station, table, azimuth)
     # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one
     turned = np.isnan(values(table, "azimuth")) & (away > towards)
     demand, axis = np.where(turned, away, towards), values(table, "azimuth_used")
     driven = np.where(turned, azimuth + 180.0, azimuth)
     outcome = {"azimuth_used": np.where(turned, (axis + 180.0) % 360.0, axis)}
     outcome |= {"demand_exact": demand, "demand_two_sided": np.maximum(towards, away)}
-    return outcome | _pounding_columns(station, table, driven, demand, np.stack(radii))
+    radii, residual = np.stack(others[:2]), np.stack(others[2:])
+    outcome |= _pounding_columns(station, table, driven, demand, radii, residual)
+    return outcome | _residual_columns(residual, table, record_supports(station, table))
 
 
 def _pounding_columns(
@@ -128,11 +133,13 @@ def _pounding_columns(
     azimuth: FloatArray,
     demand: FloatArray,
     radii: FloatArray,
+    residual: FloatArray,
 ) -> Columns:
     """
     Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
 
-    A demand that stays below the gap needs no history: radii are those without contact.
+    A demand that stays below the gap needs no history: radii are those without contact, and so is
+    ``residual``, the displacements at rest afterwards, which receives those of the histories.
     """
     meets = ~(demand < CERTAINLY_APART * values(table, "gap"))
     impacts, velocity = np.zeros(demand.size, dtype=np.int64), np.zeros(demand.size)
@@ -140,11 +147,20 @@ def _pounding_columns(
     if meets.any():
         history = pounding_maxima(station, chosen(table, meets), azimuth[meets])
         impacts[meets], velocity[meets] = history.impacts, history.impact_velocity
+        residual[:, meets] = history.residual
         # impacts amplify the radius that the same oscillator has without contact
         before, ratio = radii[:, meets], np.ones_like(history.per)
         amplification[:, meets] = np.divide(history.per, before, out=ratio, where=before > 0)
     columns = impacts, velocity, *amplification
-    return dict(zip(EXACT_COLUMNS[2:], columns, strict=True))
+    return dict(zip(EXACT_COLUMNS[2:6], columns, strict=True))
+
+
+def _residual_columns(residual: FloatArray, table: Table, supported: BoolArray) -> Columns:
+    """Return the displacements at rest and the gap that they leave; NaN without such a history."""
+    known = np.where(supported & can_yield(table), residual, np.nan)
+    # What would overlap at rest is pressed together
+    left = np.maximum(values(table, "gap") + known[1] - known[0], 0.0)
+    return dict(zip(EXACT_COLUMNS[6:], (*known, left), strict=True))
 
 
 def no_outcome(count: int) -> Columns:
@@ -202,13 +218,14 @@ def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -
 
 def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
     """
-    Return the response at contact level of pairs that do not touch, (4, n_pairs), m.
+    Return the response at contact level of pairs that do not touch, (6, n_pairs), m.
 
     Largest relative displacement of 1 towards 2, and with the buildings in the other order; PER of
-    both buildings. Linear pairs take the shorter computation, and their PER from the table.
+    both buildings; their displacements at rest afterwards. Linear pairs take the shorter
+    computation, and their PER from the table.
     """
-    free = np.empty((4, azimuth.size))
-    free[2:] = at_contact(table, "per")
+    free = np.zeros((6, azimuth.size))
+    free[2:4] = at_contact(table, "per")
     yields = can_yield(table)
     if not yields.all():
         arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
@@ -223,7 +240,8 @@ def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) 
             *_arguments(pairs, azimuth[yields]),
             **_strengths(pairs),
         )
-        free[:, yields] = bilinear.one_before_two, bilinear.two_before_one, *bilinear.per
+        demands = bilinear.one_before_two, bilinear.two_before_one
+        free[:, yields] = *demands, *bilinear.per, *bilinear.residual
     return free
 
 

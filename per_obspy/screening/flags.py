@@ -53,6 +53,17 @@ def heights_are_from_raster(pairs: Table) -> BoolArray:
     return mask
 
 
+def damage_is_unknown(pairs: Table) -> BoolArray:
+    """Return a mask of pairs that an earlier earthquake may have damaged, nobody knows how."""
+    return _left_by_earlier(pairs, "unknown")
+
+
+def _left_by_earlier(pairs: Table, word: str) -> BoolArray:
+    if "after_damage" not in pairs:
+        return np.zeros(len(pairs["gap"]), dtype=bool)
+    return np.asarray(np.asarray(pairs["after_damage"], dtype=object) == word)
+
+
 def elastic_ratios(table: Table) -> dict[str, FloatArray]:
     """
     Return the elastic displacement of both buildings over their yield displacement by HAZUS.
@@ -97,6 +108,8 @@ def raised_by_pairs(table: Table) -> dict[str, BoolArray]:
         "touching": gap == 0.0,
         "learned_outlines": outlines_are_learned(table),
         "raster_height": heights_are_from_raster(table),
+        "residual_gap": _left_by_earlier(table, "residual"),
+        "after_damage_unknown": damage_is_unknown(table),
         **_beyond_elastic(table),
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),

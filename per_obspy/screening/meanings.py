@@ -52,6 +52,14 @@ FLAGS: dict[str, str] = {
     "raster_height": (
         "a height is the median of a raster inside the outline, with the deviation height_log_std"
     ),
+    "residual_gap": (
+        "the gap is what the history of an earlier earthquake left; gap_before is that of the pair "
+        "table"
+    ),
+    "after_damage_unknown": (
+        "an earlier earthquake may have damaged the pair in a way that no history followed: the "
+        "state is not no, measure the gap"
+    ),
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"
     ),

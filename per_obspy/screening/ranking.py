@@ -16,7 +16,7 @@ from per_obspy.config.screening import STATES as STATES
 from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.codes import SUFFICES
-from per_obspy.screening.flags import elastic_ratios, outlines_are_learned
+from per_obspy.screening.flags import damage_is_unknown, elastic_ratios, outlines_are_learned
 from per_obspy.screening.values import (
     BoolArray,
     Columns,
@@ -112,7 +112,7 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
 
     The population alone decides the state, with the configuration the class. The first ratio is 0
     for touching pairs and NaN (an empty cell) where the demand is 0. Pairs of outlines that were
-    learned from images are ``unlikely`` where others are a ``no``.
+    learned from images, or of unknown damage, are ``unlikely`` where others are a ``no``.
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     nothing = np.full(demand.shape, np.nan)
@@ -121,9 +121,10 @@ def state_columns(table: pd.DataFrame, screening: Screening) -> Columns:
     for name, is_present in configuration.items():
         factor = np.where(is_present, np.maximum(factor, CONFIGURATIONS[name]), factor)
     velocity = factor * values(table, "expected_impact_velocity")
-    # no gap of learned outlines is known to be wide enough
+    # no gap of learned outlines, or after damage, is known to be wide enough
     state = pounding_state(values(table, "probability"), screening.states)
-    state[outlines_are_learned(table) & (state == STATES[-1])] = STATES[-2]
+    doubtful = outlines_are_learned(table) | damage_is_unknown(table)
+    state[doubtful & (state == STATES[-1])] = STATES[-2]
     return {
         "demand_ratio": np.divide(gap, demand, out=nothing, where=demand > 0),
         **elastic_ratios(table),
@@ -248,6 +249,9 @@ NUMBERS = (
     "impact_velocity_exact",
     "amplification_exact_1",
     "amplification_exact_2",
+    "residual_1",
+    "residual_2",
+    "residual_gap",
     "missing_gap",
     "supplemental_damping",
     "bumper_restitution",

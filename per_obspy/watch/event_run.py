@@ -31,6 +31,7 @@ from per_obspy.records.file_list import file_states, files_below, growing_files
 from per_obspy.results.ranked_table import table_outputs
 from per_obspy.runs.output_folder import Result
 from per_obspy.runs.run import run
+from per_obspy.watch.aftershocks import result_before
 from per_obspy.watch.event_settings import (
     Watcher,
     settings_of_event,
@@ -262,6 +263,8 @@ def _run_with_records(
         return Done(state, "no records yet")
     # The number is in the page and the summary
     number = max(state.revision, newest_revision(folder)) + 1
+    if earlier := result_before(watcher, state):
+        settings = settings.model_copy(update={"after": earlier})
     facts = {"event_id": state.event_id, "revision": number, "revised": started}
     result = run(settings, None, watcher.executor, watcher.progress, facts, fetched)
     return _published(folder, state, result, task, started)

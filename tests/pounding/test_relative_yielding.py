@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
 
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.relative import (
@@ -11,6 +12,8 @@ from per_obspy.pounding.relative import (
     yielding_approach,
     yielding_relative_displacement,
 )
+from per_obspy.pounding.row_history import pounding_history
+from per_obspy.pounding.structure import Structure
 from per_obspy.spectra.bilinear import bilinear_response
 
 DT = 0.01
@@ -93,6 +96,7 @@ def test_radii_and_displacements_are_those_of_single_oscillators(ground, pairs, 
                 found.displacement_maxima[i - 1, index], alone.displacement_maximum, rtol=1e-8
             )
             assert_allclose(found.per[i - 1, index], alone.displacement_radius, rtol=1e-8)
+            assert_allclose(found.residual[i - 1, index], alone.residual, rtol=1e-6, atol=1e-12)
 
 
 def test_against_sampled_differences_of_single_histories(ground, pairs, strength):
@@ -159,3 +163,60 @@ def test_the_approach_of_populations_is_nearly_exact(ground, pairs, strength):
     reference = approach(*ground, DT, **pairs)
     assert_allclose(linear.displacement, reference.displacement, rtol=0.016)
     assert_allclose(linear.velocity, reference.velocity, rtol=0.03)
+
+
+def rest_by_ode(pulse, period, damping, yields, hardening):
+    """Integrate an oscillator and its elastoplastic spring; return where it will rest."""
+    omega, end = 2.0 * np.pi / period, DT * (pulse.size - 1)
+
+    def rate(time, state):
+        u, v, stretch = state
+        ground = np.interp(time, DT * np.arange(pulse.size), pulse, right=0.0)
+        force = omega**2 * (hardening * u + (1.0 - hardening) * stretch)
+        is_sliding = abs(stretch) >= yields and stretch * v > 0.0
+        return v, -ground - 2.0 * damping * omega * v - force, 0.0 if is_sliding else v
+
+    # the plastic part stays from the first periods on, long before the motion fades
+    span = (0.0, end + 4.0 * period)
+    state = solve_ivp(rate, span, (0.0, 0.0, 0.0), max_step=DT / 8, rtol=1e-9, atol=1e-12)
+    return (1.0 - hardening) * (state.y[0, -1] - state.y[2, -1])
+
+
+def test_a_pulse_leaves_the_displacement_of_an_independent_integration():
+    # catches: plastic displacement taken for that at rest, exchanged structures, a sign
+    pulse = -4.0 * np.sin(np.linspace(0.0, np.pi, 41))
+    ground = np.stack([pulse, np.zeros_like(pulse)])
+    given = {"period_1": 0.9, "damping_1": 0.15, "period_2": 0.3, "damping_2": 0.15, "azimuth": 0.0}
+    yields = {"yield_displacement_1": 0.03, "hardening_1": 0.2}
+    apart = yielding_relative_displacement(ground, DT, **given, **yields).residual
+    # the solver steps over the ends of yielding, by DT / 8 at most
+    assert_allclose(apart[0], rest_by_ode(pulse, 0.9, 0.15, 0.03, 0.2), rtol=5e-3)
+    assert apart[0] > 0.01
+    assert apart[1] == 0.0
+    # from the other side, both are exchanged
+    turned = {f"{name[:-1]}{3 - int(name[-1])}": value for name, value in yields.items()}
+    swapped = {"period_1": 0.3, "damping_1": 0.15, "period_2": 0.9, "damping_2": 0.15}
+    other = yielding_relative_displacement(-ground, DT, azimuth=0.0, **swapped, **turned).residual
+    assert_allclose(other[::-1], -apart, rtol=1e-9)  # located to rounding
+
+
+def test_impacts_leave_what_the_history_of_the_pair_ends_with(ground, pairs, strength):
+    # catches: residuals of the pair without contact. Both kernels are exact in different ways
+    several = {name: values[40:46] for name, values in {**pairs, **strength}.items()}
+    contact = {"mass_1": 1.0, "mass_2": 2.0, "restitution": 0.6}
+    apart = yielding_relative_displacement(ground, DT, **several)
+    found = pounding_histories(ground, DT, gap=0.3 * apart.one_before_two, **contact, **several)
+    assert (np.abs(found.residual - apart.residual) > 1e-4).any()
+    for index in range(6):
+        one = {name: values[index] for name, values in several.items()}
+        angle = np.radians(one.pop("azimuth"))
+        along = np.cos(angle) * ground[0] + np.sin(angle) * ground[1]
+        structures = [
+            Structure(mass=float(i), **{n[:-2]: v for n, v in one.items() if n.endswith(f"_{i}")})
+            for i in (1, 2)
+        ]
+        history = pounding_history(along, DT, structures, 0.3 * apart.one_before_two[index], 0.6)
+        for i, structure in enumerate(structures):
+            rest = (1.0 - structure.hardening) * history.plastic_displacement[i, -1]
+            # impacts magnify rounding; five digits are seen
+            assert_allclose(found.residual[i, index], rest, rtol=1e-4, atol=1e-9)

@@ -482,3 +482,38 @@ def test_cells_are_named_with_their_places_across_the_date_line(half_lost, tmp_p
     north, east = re.fullmatch(r"([\d.]+) N, ([\d.]+) [EW]", name).groups()
     # Half a cell of 1 km at most; at 180 degrees east is west
     assert_allclose([float(north), float(east)], [0.004, 180.0], atol=0.0046)
+
+
+def test_an_aftershock_starts_from_the_results_of_the_main_shock(copied):
+    # catches: results that are read but not used, in no key, or of the run itself
+    configuration = copied / "run.toml"
+    text = configuration.read_text()
+    shutil.copytree(copied / "out", copied / "main")
+    main = pd.read_parquet(copied / "main" / "risk.parquet").set_index("pair_id")
+    configuration.write_text(f'after = "main"\n{text}')
+    counts = run(configuration, executor=InProcess()).record["counts"]
+    found = pd.read_parquet(copied / "out" / "risk.parquet").set_index("pair_id")
+    words = found["after_damage"].value_counts()
+    assert counts["after_damage_unknown"] == words["unknown"] > 0
+    assert counts["after_damage_residual"] == words.get("residual", 0)
+    assert not (found.loc[found["after_damage"] == "unknown", "state"] == "no").any()
+    assert run(configuration, executor=InProcess()).did_nothing
+    # other results of the same name are another input
+    earlier = main.assign(after_damage="unknown", rank=range(1, 1 + len(main)))
+    earlier.reset_index().to_parquet(copied / "main" / "risk.parquet")
+    assert screened(copied)["after_damage_unknown"] == len(found)
+    # without it the results are those of before
+    configuration.write_text(text)
+    screened(copied)
+    again = pd.read_parquet(copied / "out" / "risk.parquet").set_index("pair_id")
+    pd.testing.assert_frame_equal(again, main)
+
+
+@pytest.mark.parametrize(
+    ("after", "problem"), [("out", "of this run itself"), ("nowhere", "no finished run")]
+)
+def test_a_run_starts_from_finished_results_of_another(copied, after, problem):
+    configuration = copied / "run.toml"
+    configuration.write_text(f'after = "{after}"\n{configuration.read_text()}')
+    with pytest.raises(CatalogError, match=f"{after}: after: .*{problem}"):
+        screen(configuration, executor=InProcess())

@@ -5,14 +5,18 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from obspy import UTCDateTime
+from obspy.core.event import Catalog, Event, Origin
+from obspy.geodetics import locations2degrees
 from screening_samples import make_pairs, make_station
 
-from per_obspy.config import Building, Interpolation, Screening
-from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.config import Building, Interpolation, Run, Screening, checked
+from per_obspy.constants import EARTH_RADIUS, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.records.station_list import read_station_list
+from per_obspy.runs.screening import ground_of_run
 from per_obspy.screening.assignment import stations_of
 from per_obspy.screening.risk import risk_rows
 from per_obspy.screening.site_motion import RegionalMotion, prepared_field
@@ -119,6 +123,43 @@ def test_records_win_where_they_are_near(tmp_path):
     # without the record amplitudes serve all of them
     alone, _ = screened(path, rows[:3])
     assert alone["demand_rule"].eq("amplitudes").all()
+
+
+def with_distances(places, source, depth):
+    """Return stations with their distances from a hypocentre, km, to the metre."""
+    features = []
+    for number, (east, north) in enumerate(places):
+        angle = np.radians(locations2degrees(source[1], source[0], north, east))
+        repi = round(EARTH_RADIUS * angle / 1000.0, 3)
+        known = {"repi": repi, "rhypo": round(float(np.hypot(repi, depth)), 3)}
+        features.append(feature(f"S{number}", (east, north), distances=known))
+    return features
+
+
+def test_the_hypocentre_is_that_of_the_event_else_where_distances_begin(tmp_path):
+    # catches: exchanged axes, depth in km, a list that wins over the event
+    places = [(20.0, 10.0), (20.4, 10.1), (19.8, 9.6), (21.0, 9.0), (20.2, 11.0)]
+    stations = with_distances(places, (20.3, 9.9), 12.0)
+    path = write_list(tmp_path / "list.json", *stations)
+    records = {"stationlist": str(path)}
+
+    def source(**more):
+        given = {"name": "a", "output": "o", "records": {**records, **more}}
+        settings = checked(Run, {**given, "pairs": {"file": "p.csv"}})
+        return ground_of_run(settings, ())[0].amplitudes.source
+
+    # distances have three digits of a km
+    assert_allclose(source()[:2], (20.3, 9.9), atol=1e-4)
+    assert_allclose(source()[2], 12_000.0, atol=10.0)
+    origin = Origin(time=UTCDateTime(0), longitude=20.5, latitude=9.5, depth=7000.0)
+    Catalog([Event(origins=[origin])]).write(str(tmp_path / "event.xml"), "QUAKEML")
+    assert source(event=str(tmp_path / "event.xml")) == (20.5, 9.5, 7000.0)
+    # stations in line, distances of two places, and too few
+    line = with_distances([(20.0 + 0.1 * i, 0.0) for i in range(6)], (20.3, 0.5), 12.0)
+    mixed = [*stations[:4], *with_distances(places[4:], (25.0, 9.9), 12.0)]
+    for features in (line, mixed, stations[:4]):
+        write_list(path, *features)
+        assert source() is None
 
 
 def test_pairs_outside_the_given_periods_are_rejected(tmp_path):

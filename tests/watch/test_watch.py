@@ -140,6 +140,32 @@ def test_two_earthquakes_have_results_of_their_own_the_larger_first(city, server
     assert city.event("xx1") != city.event("xx2")
 
 
+def test_an_aftershock_starts_from_the_newest_result_of_the_main_shock(
+    city, server, caplog, monkeypatch
+):
+    # catches: an earthquake after itself or after a later one, a result that is not there yet
+    after, ran = {}, event_run.run
+
+    def noted(settings, *others):
+        after[settings.output.parent.name] = settings.after
+        return ran(settings, *others)
+
+    monkeypatch.setattr(event_run, "run", noted)
+    server.events |= {"xx2": other_event(10.0, 7.3), "far": other_event(20.0, 6.5, longitude=1.0)}
+    # larger ones first: the second has a result before the first one has
+    city.at(90, aftershocks=True)
+    assert (after["xx1"], after["xx2"]) == (None, None)
+    assert "xx2: what xx1 left is not known: it has no result" in caplog.messages
+    # 111 km away, where magnitude 7.3 reaches 77 km
+    assert after["far"] is None
+    city.at(330, aftershocks=True)
+    assert after["xx2"] == city.event("xx1") / "revisions" / city.revisions("xx1")[-1]
+    assert (after["xx1"], after["far"]) == (None, None)
+    # only where it is asked for
+    city.at(930)
+    assert set(after.values()) == {None}
+
+
 def test_a_second_watcher_is_refused(city):
     with watch.locked_folder(city.folder), pytest.raises(FolderInUse, match="another run"):
         city.at(61)

@@ -160,14 +160,14 @@ def find_footprint_pairs(
     layer: str | None = None,
     gap_std: float | None = None,
     columns: Mapping[str, str] | None = None,
-    box: Box | None = None,
-    raster: Path | None = None,
+    bbox: Box | None = None,
+    heights: Path | None = None,
 ) -> FootprintPairs:
     """
     Find pairs as :func:`pairs_from_footprints` does, and keep the buildings.
 
-    With ``box`` (west, south, east, north, degrees) only buildings that touch it are read. Missing
-    heights are taken from ``raster``, see :func:`.raster_heights.raster_heights`.
+    With ``bbox`` (west, south, east, north, degrees) only buildings that touch it are read. Missing
+    heights are taken from a raster ``heights``, see :func:`.raster_heights.raster_heights`.
     """
     largest = checks.number("distance", distance, checks.positive)
     _require_within("distance", largest, "gap")
@@ -176,7 +176,7 @@ def find_footprint_pairs(
         _require_within("gap_std", gap_std, "gap_std")
     # Footprints, without those that repeat another
     source = str(path)
-    buildings, rejected = _usable_buildings(path, layer, columns or {}, box, raster)
+    buildings, rejected = _usable_buildings(path, layer, columns or {}, bbox, heights)
     buildings, outlines = projected(buildings, source)
     pairs = neighbours(outlines, largest)
     if pairs.empty:

@@ -201,7 +201,7 @@ def _of_station_list(path: Path) -> Description:
     """Describe a list of amplitudes; places are marked by their share of the largest motion."""
     from per_obspy.records.station_list import read_station_list
 
-    stations, unusable, intensities = read_station_list(path)
+    stations, unusable, intensities, _ = read_station_list(path)
     # What is used, and what is left out
     lines = [
         ("stations", f"{len(stations)} usable, {len(unusable)} not"),

@@ -57,6 +57,8 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
     if footprints is None:
         return {}
     require_extra("gis", "pyogrio", "pyproj", "shapely")
+    if footprints.heights:
+        require_extra("raster", "rasterio")
     # The same layer and options give the same pairs
     key = _key(footprints)
     if earlier := earlier_status(folder / STATUS, key):
@@ -76,7 +78,8 @@ def _write_found(footprints: Footprints, folder: Path) -> dict[str, int]:
     # A finished run does not wait for this
     from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
 
-    found = find_footprint_pairs(footprints.file, **_options(footprints))
+    options, raster = _options(footprints), footprints.heights
+    found = find_footprint_pairs(footprints.file, **options, heights=raster)
     write_search(found, folder / PAIRS)
     return dict(zip(COUNTED, (len(found.pairs), len(found.pairs.attrs["rejected"])), strict=True))
 
@@ -114,6 +117,11 @@ def pair_table(settings: Run, folder: Path) -> Path | None:
     return pairs.file if pairs else None
 
 
+def footprint_files(footprints: Footprints) -> list[Path]:
+    """Return the files of the layer, and the raster of its heights."""
+    return [*layer_files(footprints.file), *filter(None, [footprints.heights])]
+
+
 def layer_files(layer: Path) -> list[Path]:
     """Return all files of a layer; a Shapefile has several."""
     parts = [layer.with_suffix(suffix) for suffix in _PARTS] if layer.suffix == ".shp" else []
@@ -122,12 +130,12 @@ def layer_files(layer: Path) -> list[Path]:
 
 def _options(footprints: Footprints) -> dict[str, Any]:
     """Return the configured options of the search for pairs; others keep their defaults."""
-    return footprints.model_dump(exclude={"file"}, exclude_none=True)
+    return footprints.model_dump(exclude={"file", "heights"}, exclude_none=True)
 
 
 def _key(footprints: Footprints) -> str:
     """Return the hash of the program, the options and the content of the layer."""
-    files = [path for path in layer_files(footprints.file) if path.is_file()]
+    files = [path for path in footprint_files(footprints) if path.is_file()]
     content = {
         "version": version("per_obspy"),
         "options": _options(footprints),

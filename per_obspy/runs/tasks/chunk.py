@@ -11,8 +11,10 @@ from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.results.parts import write_part
+from per_obspy.runs.tasks.earlier_result import EarlierResult, earlier_rows
 from per_obspy.runs.tasks.ground_files import GroundFiles, read_ground
 from per_obspy.runs.tasks.parts import Part, PartTask, rows_hash
+from per_obspy.screening.earlier_damage import pairs_after
 from per_obspy.screening.ranking import in_order
 from per_obspy.screening.risk import risk_rows
 from per_obspy.screening.site_motion import RegionalMotion
@@ -32,6 +34,8 @@ class ChunkTask(PartTask):
     #: Settings.
     building: Building
     screening: Screening
+    #: Results of an earlier earthquake, from which the pairs start.
+    after: EarlierResult | None = None
 
     @property
     def rows(self) -> int:
@@ -51,6 +55,7 @@ class ChunkTask(PartTask):
         # Program, settings and ground motion
         settings = [self.building.model_dump_json(), self.screening.model_dump_json()]
         texts = [version("per_obspy"), rows.source, *settings, self.ground.key, repr(rows.broken)]
+        texts += [self.after.key] if self.after else []
         # Raw rows, their places in the file, what came before, and what is odd
         places = rows.lines.tobytes() + self.chunk.repeated.tobytes()
         return rows_hash(texts, rows.table, places, "\n".join(self.chunk.odd).encode())
@@ -59,12 +64,16 @@ class ChunkTask(PartTask):
         """Write the rows of the chunk and their status, and return the finished part."""
         remove_file(self.part)
         pairs = checked_chunk(self.chunk)
+        rejected_rows = pairs.attrs["rejected"]
+        if self.after:
+            left = earlier_rows(self.after, pairs["pair_id"])
+            pairs = pairs_after(pairs, left, self.building.code_level)
         rows, uncomputed = _computed_rows(pairs, read_ground(self.ground), self)
         # Rows that cannot be computed belong to the file of the chunk
         rejected = [row._replace(source=self.chunk.rows.source) for row in uncomputed]
         if len(rows):
             write_part(in_order(rows), self.number, self.part)
-        return self.record([*pairs.attrs["rejected"], *rejected])
+        return self.record([*rejected_rows, *rejected])
 
     def failed(self, reason: str) -> Part:
         """Return a part of one rejection per pair after a failure; the next run repeats it."""

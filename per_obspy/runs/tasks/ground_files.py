@@ -111,6 +111,8 @@ def _with_amplitudes(
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """Return a ground motion with the stations of a list, and those that are not used."""
     listed = read_station_list(amplitudes)
+    # Records and the description of the earthquake know better where it began
+    source = source or (listed.hypocentre and Hypocentre(*listed.hypocentre))
     field, unused = amplitude_field(listed, str(amplitudes), records, settings, source)
     key = bytes_hash(repr([ground.key, file_hash(amplitudes), source]).encode())
     return ground._replace(amplitudes=field, key=key), unused

@@ -73,6 +73,18 @@ def test_a_change_of_layer_option_or_result_is_noticed(tmp_path):
         write_drawn_pairs(_settings(tmp_path, distance=0.1), tmp_path, silent)
     write_drawn_pairs(_settings(tmp_path, gap_std=0.2), tmp_path, silent)
     assert pd.read_parquet(tmp_path / "pairs.parquet")["gap_std"].tolist() == [0.2] * 5
+    # the checks are those of the command; another raster is another input
+    with pytest.raises(CatalogError, match="a box needs GeoParquet"):
+        write_drawn_pairs(_settings(tmp_path, bbox=[0.0, -1.0, 1.0, 1.0]), tmp_path, silent)
+    for content in (b"no raster", b"another one"):
+        (tmp_path / "heights.tif").write_bytes(content)
+        with pytest.raises(CatalogError, match=r"heights\.tif: is no GeoTIFF"):
+            write_drawn_pairs(
+                _settings(tmp_path, heights=str(tmp_path / "heights.tif")), tmp_path, silent
+            )
+    for box in ([1.0, -1.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0, float("nan")]):
+        with pytest.raises(CatalogError, match=r"pairs\.footprints\.bbox"):
+            _settings(tmp_path, bbox=box)
     (tmp_path / "pairs.parquet").write_bytes(b"damaged")
     assert write_drawn_pairs(_settings(tmp_path, gap_std=0.2), tmp_path, silent)["pairs"] == 5
     assert len(pd.read_parquet(tmp_path / "pairs.parquet")) == 5
