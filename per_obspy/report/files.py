@@ -28,14 +28,18 @@ from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
 from per_obspy.report.page.background import read_background
-from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS, write_page
+from per_obspy.report.page.document import (
+    MOST_ROWS,
+    REJECTED_COLUMNS,
+    page_columns,
+    write_page,
+)
 from per_obspy.report.page.map_lines import (
     continuous,
     lines_around,
     read_outlines,
     towns_around,
 )
-from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
 from per_obspy.report.results import Results
 from per_obspy.report.statements import alert_line
@@ -197,10 +201,8 @@ class TableReader:
         """Take some rows."""
         rank = piece["rank"].to_numpy()
         if self.is_whole:
-            # The page holds the worst pairs, with all columns for its export
             kept = piece.head(max(PAGE_PAIRS - self.tally.pairs, 0))
-            names = [str(name) for name in kept if name != "area"][: 2 * MOST_COLUMNS]
-            self._worst.append(with_areas(kept[names], kept, self.totals))
+            self._worst.append(with_areas(kept[page_columns(kept)], kept, self.totals))
         self.tally.add(piece)
         self._counted.append(piece_totals(piece, self.totals, self._classes))
         self._listed.append(piece[piece["rank"] <= SHEET_ROWS])
@@ -315,7 +317,6 @@ def read_table(
     write_totals(areas, folder / "totals.csv")
     report.outputs.append(folder / "totals.csv")
     buildings, hit = _worst_buildings(folder / "buildings.parquet")
-    # The pairs of the page have all columns
     return replace(
         results,
         tally=reader.tally,

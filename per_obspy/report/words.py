@@ -3,16 +3,18 @@
 import math
 from collections.abc import Mapping
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
 from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import UNKNOWN_CLASS, UNKNOWN_STATE
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Longest name of a pair, station or class in a sentence, characters.
 LONGEST_NAME = 60
@@ -117,9 +119,9 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
     return [*judged, *described, *_prevention_lines(pair), *_flag_lines(pair)]
 
 
-def prevention_kind(pair: "Mapping[Any, Any] | pd.Series[Any]") -> str:
+def prevention_kind(pairs: pd.DataFrame) -> NDArray[np.object_]:
     """
-    Return the case of the measures for a pair.
+    Return the case of the measures for each pair.
 
     ``unknown_gap`` and ``not_computed`` (the table has no demand) are no promise; ``gap``: a wider
     one is needed; ``in_doubt``: the gap is enough for the likeliest inputs, but the pair may pound
@@ -127,31 +129,34 @@ def prevention_kind(pair: "Mapping[Any, Any] | pd.Series[Any]") -> str:
 
     Examples
     --------
-    >>> prevention_kind({"gap": 0.1, "demand": 0.2, "state": "yes"}), prevention_kind({"gap": 0.1})
-    ('gap', 'not_computed')
+    >>> table = pd.DataFrame({"gap": [0.1, np.nan], "demand": 0.2, "state": "yes"})
+    >>> prevention_kind(table).tolist(), prevention_kind(table[["gap"]]).tolist()
+    (['gap', 'unknown_gap'], ['not_computed', 'unknown_gap'])
     """
-    gap = number(pair, "gap")
-    if not math.isfinite(gap):
-        return "unknown_gap"
-    missing = missing_gap(pair)
-    if not math.isfinite(missing):
-        return "not_computed"
-    if missing > 0.0:
-        return "gap"
+    missing, unknown = missing_gap(pairs), pd.Series("", pairs.index)
     # An assumed gap may be another one
-    if pair.get("risk_class") == UNKNOWN_CLASS:
-        return "unknown_gap"
-    return "nothing" if pair.get("state") == "no" else "in_doubt"
+    assumed = pairs.get("risk_class", unknown) == UNKNOWN_CLASS
+    kind = np.where(pairs.get("state", unknown) == "no", "nothing", "in_doubt").astype(object)
+    kind[assumed.to_numpy()] = "unknown_gap"
+    kind[missing > 0.0] = "gap"
+    kind[~np.isfinite(missing)] = "not_computed"
+    kind[~np.isfinite(_column(pairs, "gap"))] = "unknown_gap"
+    return kind
 
 
-def missing_gap(pair: "Mapping[Any, Any] | pd.Series[Any]") -> float:
+def missing_gap(pairs: pd.DataFrame) -> FloatArray:
     """Return demand minus gap where it is positive, m; NaN where either is unknown."""
-    missing = number(pair, "missing_gap")
-    if math.isfinite(missing):
-        return missing
+    missing = _column(pairs, "missing_gap")
     # Tables of other versions may lack the column
-    short = number(pair, "demand") - number(pair, "gap")
-    return max(short, 0.0) if math.isfinite(short) else math.nan
+    short = _column(pairs, "demand") - _column(pairs, "gap")
+    short = np.where(np.isfinite(short), np.maximum(short, 0.0), np.nan)
+    return np.where(np.isfinite(missing), missing, short)
+
+
+def _column(pairs: pd.DataFrame, name: str) -> FloatArray:
+    """Return the numbers of a column, NaN where there is none."""
+    column = pairs.get(name, pd.Series(np.nan, pairs.index))
+    return np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64)
 
 
 def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
@@ -262,11 +267,12 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on measures that prevent or soften pounding."""
-    kind, lines = prevention_kind(pair), list[str]()
+    table, lines = pd.DataFrame([dict(pair)]), list[str]()
+    kind = prevention_kind(table)[0]
     if kind != "gap":
         return [PREVENTION_WORDS[kind].format(motion=_motion_name(pair))]
     # More gap, more damping, a softer contact
-    missing = length_text(missing_gap(pair))
+    missing = length_text(missing_gap(table)[0])
     would = "would keep" if _text(pair, "spectrum") else "would have kept"
     lines.append(f"A gap wider by {missing} {would} them apart.")
     if not _text(pair, "station"):

@@ -144,8 +144,6 @@ class Page {
     say("event", content.event);
     byId("revision").textContent = content.revision || "";
     say("expected", content.expected || "");
-    const lacks = (content.tables[3] && content.tables[3].left_out) || [];
-    byId("lacks").textContent = lacks.length ? this.t("export_lacks", { names: lacks.slice(0, 30).join(", ") }) : "";
     byId("simulated").hidden = !content.simulated;
     byId("simulated").textContent = this.t("simulated");
     for (const [value, label] of content.numbers) {
