@@ -3,11 +3,10 @@
 import math
 from collections.abc import Mapping
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
@@ -15,6 +14,9 @@ from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
 from per_obspy.screening.ranking import UNKNOWN_CLASS, UNKNOWN_STATE
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Longest name of a pair, station or class in a sentence, characters.
 LONGEST_NAME = 60
@@ -119,44 +121,41 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
     return [*judged, *described, *_prevention_lines(pair), *_flag_lines(pair)]
 
 
-def prevention_kind(pairs: pd.DataFrame) -> NDArray[np.object_]:
+def prevention_kind(
+    gap: ArrayLike, missing: ArrayLike, state: ArrayLike, risk_class: ArrayLike
+) -> NDArray[np.str_]:
     """
-    Return the case of the measures for each pair.
+    Return the case of the measures for pairs.
 
     ``unknown_gap`` and ``not_computed`` (the table has no demand) are no promise; ``gap``: a wider
     one is needed; ``in_doubt``: the gap is enough for the likeliest inputs, but the pair may pound
     at others; ``nothing``: it does not pound.
 
+    Parameters
+    ----------
+    gap, missing : (n_pairs,) array_like
+        Gap, and its :func:`missing_gap`, m; NaN where it is unknown.
+    state, risk_class : (n_pairs,) array_like of str
+        Of the ranked table.
+
     Examples
     --------
-    >>> table = pd.DataFrame({"gap": [0.1, np.nan], "demand": 0.2, "state": "yes"})
-    >>> prevention_kind(table).tolist(), prevention_kind(table[["gap"]]).tolist()
-    (['gap', 'unknown_gap'], ['not_computed', 'unknown_gap'])
+    >>> prevention_kind([0.1, np.nan], [0.2, 0.0], "yes", "low").tolist()
+    ['gap', 'unknown_gap']
     """
-    missing, unknown = missing_gap(pairs), pd.Series("", pairs.index)
     # An assumed gap may be another one
-    assumed = pairs.get("risk_class", unknown) == UNKNOWN_CLASS
-    kind = np.where(pairs.get("state", unknown) == "no", "nothing", "in_doubt").astype(object)
-    kind[assumed.to_numpy()] = "unknown_gap"
-    kind[missing > 0.0] = "gap"
-    kind[~np.isfinite(missing)] = "not_computed"
-    kind[~np.isfinite(_column(pairs, "gap"))] = "unknown_gap"
-    return kind
+    enough = np.where(np.equal(state, "no"), "nothing", "in_doubt")
+    enough = np.where(np.equal(risk_class, UNKNOWN_CLASS), "unknown_gap", enough)
+    kind = np.where(np.greater(missing, 0.0), "gap", enough)
+    kind = np.where(np.isfinite(missing), kind, "not_computed")
+    return np.where(np.isfinite(gap), kind, "unknown_gap")
 
 
-def missing_gap(pairs: pd.DataFrame) -> FloatArray:
-    """Return demand minus gap where it is positive, m; NaN where either is unknown."""
-    missing = _column(pairs, "missing_gap")
+def missing_gap(known: ArrayLike, demand: ArrayLike, gap: ArrayLike) -> FloatArray:
+    """Return the missing gap of a table, else demand minus gap where it is positive, m, or NaN."""
     # Tables of other versions may lack the column
-    short = _column(pairs, "demand") - _column(pairs, "gap")
-    short = np.where(np.isfinite(short), np.maximum(short, 0.0), np.nan)
-    return np.where(np.isfinite(missing), missing, short)
-
-
-def _column(pairs: pd.DataFrame, name: str) -> FloatArray:
-    """Return the numbers of a column, NaN where there is none."""
-    column = pairs.get(name, pd.Series(np.nan, pairs.index))
-    return np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64)
+    short = np.maximum(np.subtract(demand, gap), 0.0)
+    return np.where(np.isfinite(known), known, np.where(np.isfinite(short), short, np.nan))
 
 
 def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
@@ -267,14 +266,15 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on measures that prevent or soften pounding."""
-    table, lines = pd.DataFrame([dict(pair)]), list[str]()
-    kind = prevention_kind(table)[0]
+    lines, gap = list[str](), number(pair, "gap")
+    missing = float(missing_gap(number(pair, "missing_gap"), number(pair, "demand"), gap))
+    names = _text(pair, "state"), _text(pair, "risk_class")
+    kind = str(prevention_kind(gap, missing, *names))
     if kind != "gap":
         return [PREVENTION_WORDS[kind].format(motion=_motion_name(pair))]
     # More gap, more damping, a softer contact
-    missing = length_text(missing_gap(table)[0])
     would = "would keep" if _text(pair, "spectrum") else "would have kept"
-    lines.append(f"A gap wider by {missing} {would} them apart.")
+    lines.append(f"A gap wider by {length_text(missing)} {would} them apart.")
     if not _text(pair, "station"):
         return [*lines, "Damping and bumpers: not computed without a record."]
     if (damping := number(pair, "supplemental_damping")) > 0:

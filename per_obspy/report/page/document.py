@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from per_obspy.constants import STANDARD_GRAVITY
@@ -193,8 +194,12 @@ def _tables(results: Results) -> list[PackedTable]:
 
 def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
     """Return pairs with the case of their measures."""
-    pairs = worst.assign(missing_gap=missing_gap(worst)) if "demand" in worst else worst
-    return pairs.assign(prevention_kind=prevention_kind(pairs))
+    names = ("missing_gap", "demand", "gap")
+    known, demand, gap = (worst.get(name, np.nan) for name in names)
+    missing = missing_gap(known, demand, gap)
+    texts = (worst.get(name, "") for name in ("state", "risk_class"))
+    pairs = worst.assign(missing_gap=missing) if "demand" in worst else worst
+    return pairs.assign(prevention_kind=prevention_kind(gap, missing, *texts))
 
 
 def _buildings(results: Results) -> pd.DataFrame:
