@@ -19,12 +19,17 @@ async function unpacked(text) {
 function readColumns(table, buffer, start) {
   let at = start;
   table.column = {};
-  const places = {};
   for (const column of table.columns) {
-    const size = { choice: 2, names: 2, text: 0 }[column.kind] ?? 4;
-    const bytes = new Uint8Array(buffer, at, size * table.count);
-    table.column[column.name] = READERS[column.kind](column, bytes, places);
-    at += size * table.count;
+    const size = ({ choice: 2, names: 2, text: 0 }[column.kind] ?? 4) * table.count;
+    column.bytes = new Uint8Array(buffer, at, size);
+    at += size;
+    // Read when it is used first: most columns are of the details of a pair
+    const get = () => {
+      const value = READERS[column.kind](column, table);
+      Object.defineProperty(table.column, column.name, { value });
+      return value;
+    };
+    Object.defineProperty(table.column, column.name, { get, enumerable: true, configurable: true });
   }
   return at;
 }
@@ -40,35 +45,42 @@ function wholes(bytes) {
 }
 
 // Numbers from their places among all decimal ones of some digits
-function numbers(column, bytes) {
+function numbers(column) {
+  const places = wholes(column.bytes);
   const first = 10 ** (column.digits - 1);
-  return Float64Array.from(wholes(bytes), (place) => {
-    if (place === 0) return 0;
-    if (place === UNKNOWN) return NaN;
-    if (place === INFINITE) return Infinity;
-    const [order, sign] = [Math.abs(place) - 1, Math.sign(place)];
+  const found = new Float64Array(places.length);
+  for (let i = 0; i < places.length; i += 1) {
+    const order = Math.abs(places[i]) - 1;
     const power = LOWEST + Math.floor(order / (9 * first)) - column.digits + 1;
-    const whole = sign * (first + (order % (9 * first)));
-    return power < 0 ? whole / 10 ** -power : whole * 10 ** power;
-  });
+    const whole = Math.sign(places[i]) * (first + (order % (9 * first)));
+    found[i] = power < 0 ? whole / 10 ** -power : whole * 10 ** power;
+    if (places[i] === UNKNOWN) found[i] = NaN;
+    if (places[i] === INFINITE) found[i] = Infinity;
+  }
+  return found;
+}
+
+// Whole numbers of a unit, of which so many are 1
+function units(whole, unit) {
+  const found = new Float64Array(whole.length);
+  for (let i = 0; i < whole.length; i += 1) found[i] = whole[i] === UNKNOWN ? NaN : whole[i] / unit;
+  return found;
+}
+
+// Steps from where a place is expected: building 1 amid the pair, building 2 on the other side
+function wholePlaces(column, table) {
+  const whole = wholes(column.bytes);
+  const [middle, other] = column.before.map((name) => wholePlaces(table.columns.find((one) => one.name === name), table));
+  if (middle) for (let i = 0; i < whole.length; i += 1) whole[i] += other ? 2 * middle[i] - other[i] : middle[i];
+  return whole;
 }
 
 const READERS = {
   number: numbers,
   chance: numbers,
-  whole: (column, bytes) => Float64Array.from(wholes(bytes), (value) => (value === UNKNOWN ? NaN : value)),
-  // Steps from where a place is expected: building 1 amid the pair, building 2 on the other side
-  place: (column, bytes, places) => {
-    const whole = wholes(bytes);
-    const [middle, other] = column.before.map((name) => places[name]);
-    if (middle) for (let i = 0; i < whole.length; i += 1) whole[i] += other ? 2 * middle[i] - other[i] : middle[i];
-    places[column.name] = whole;
-    return Float64Array.from(whole, (value) => (value === UNKNOWN ? NaN : value / 1e6));
-  },
-  choice: (column, bytes) => ({
-    texts: column.texts,
-    codes: new Uint16Array(bytes.slice().buffer),
-  }),
+  whole: (column) => units(wholes(column.bytes), 1),
+  place: (column, table) => units(wholePlaces(column, table), 1e6),
+  choice: (column) => ({ texts: column.texts, codes: new Uint16Array(column.bytes.slice().buffer) }),
   text: (column) => column.texts,
 };
 READERS.names = READERS.choice;

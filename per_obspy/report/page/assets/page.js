@@ -17,12 +17,15 @@ class Page {
       return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
     };
     // With so many decimals; without a number of them two digits, of what the contact law leaves uncertain
+    const forms = {};
     this.number = (value, digits) => {
       if (!Number.isFinite(value)) return "–";
       // No minus before a zero
       const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
       const form = digits === undefined ? { minimumSignificantDigits: 2, maximumSignificantDigits: 2 } : { minimumFractionDigits: digits, maximumFractionDigits: digits };
-      return shown.toLocaleString(content.language, { ...form, useGrouping: "always" });
+      // Made once each: that takes longer than to write a number
+      forms[digits] = forms[digits] || new Intl.NumberFormat(content.language, { ...form, useGrouping: "always" });
+      return forms[digits].format(shown);
     };
     this.setGrades();
     this.setBuildings();
