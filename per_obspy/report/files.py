@@ -52,6 +52,7 @@ from per_obspy.results.totals import (
     CountedTotals,
     RegionTotals,
     areas_of,
+    named_areas,
     piece_totals,
     region_totals,
     totals_columns,
@@ -201,6 +202,7 @@ class TableReader:
         """Take some rows."""
         rank = piece["rank"].to_numpy()
         if self.is_whole:
+            # The page holds the worst pairs
             kept = piece.head(max(PAGE_PAIRS - self.tally.pairs, 0))
             self._worst.append(with_areas(kept[page_columns(kept)], kept, self.totals))
         self.tally.add(piece)
@@ -252,7 +254,7 @@ def needed_columns(totals: Totals) -> list[str]:
 
 def with_areas(pairs: pd.DataFrame, rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
     """Return pairs of the page with the areas of the rows that they come from."""
-    return pairs.assign(area=areas_of(rows, totals, totals.area or ""))
+    return named_areas(pairs.assign(area=areas_of(rows, totals, totals.area or "")), totals)
 
 
 def outlines_beside(*pairs: Path | None) -> Path | None:
@@ -317,13 +319,14 @@ def read_table(
     write_totals(areas, folder / "totals.csv")
     report.outputs.append(folder / "totals.csv")
     buildings, hit = _worst_buildings(folder / "buildings.parquet")
+    # Areas have names for people from here on
     return replace(
         results,
         tally=reader.tally,
         worst=reader.worst if reader.is_whole else results.worst,
         listed=reader.listed,
         shown=reader.shown,
-        areas=areas,
+        areas=named_areas(areas, table.totals),
         buildings=buildings,
         buildings_hit=hit,
     )

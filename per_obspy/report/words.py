@@ -266,6 +266,7 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on measures that prevent or soften pounding."""
+    # As on the page
     lines, gap = list[str](), number(pair, "gap")
     missing = float(missing_gap(number(pair, "missing_gap"), number(pair, "demand"), gap))
     names = _text(pair, "state"), _text(pair, "risk_class")

@@ -197,6 +197,7 @@ def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
     names = ("missing_gap", "demand", "gap")
     known, demand, gap = (worst.get(name, np.nan) for name in names)
     missing = missing_gap(known, demand, gap)
+    # A table of an ensemble has no demand
     texts = (worst.get(name, "") for name in ("state", "risk_class"))
     pairs = worst.assign(missing_gap=missing) if "demand" in worst else worst
     return pairs.assign(prevention_kind=prevention_kind(gap, missing, *texts))

@@ -151,6 +151,7 @@ def _places(
     before = [name for name in (axis, f"{axis}_1") if name in places]
     whole = _whole(column, PLACES_PER_DEGREE)
     places[str(column.name)], others = whole, [places[name] for name in before]
+    # Steps from there
     if len(others) == 2:
         whole = whole - (2 * others[0] - others[1])
     elif others:
