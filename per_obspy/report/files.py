@@ -28,14 +28,18 @@ from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import draw_overview
 from per_obspy.report.page.background import read_background
-from per_obspy.report.page.document import MOST_ROWS, REJECTED_COLUMNS, write_page
+from per_obspy.report.page.document import (
+    MOST_ROWS,
+    REJECTED_COLUMNS,
+    page_columns,
+    write_page,
+)
 from per_obspy.report.page.map_lines import (
     continuous,
     lines_around,
     read_outlines,
     towns_around,
 )
-from per_obspy.report.page.packing import MOST_COLUMNS
 from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
 from per_obspy.report.results import Results
 from per_obspy.report.statements import alert_line
@@ -48,6 +52,7 @@ from per_obspy.results.totals import (
     CountedTotals,
     RegionTotals,
     areas_of,
+    named_areas,
     piece_totals,
     region_totals,
     totals_columns,
@@ -197,10 +202,9 @@ class TableReader:
         """Take some rows."""
         rank = piece["rank"].to_numpy()
         if self.is_whole:
-            # The page holds the worst pairs, with all columns for its export
+            # The page holds the worst pairs
             kept = piece.head(max(PAGE_PAIRS - self.tally.pairs, 0))
-            names = [str(name) for name in kept if name != "area"][: 2 * MOST_COLUMNS]
-            self._worst.append(with_areas(kept[names], kept, self.totals))
+            self._worst.append(with_areas(kept[page_columns(kept)], kept, self.totals))
         self.tally.add(piece)
         self._counted.append(piece_totals(piece, self.totals, self._classes))
         self._listed.append(piece[piece["rank"] <= SHEET_ROWS])
@@ -250,7 +254,7 @@ def needed_columns(totals: Totals) -> list[str]:
 
 def with_areas(pairs: pd.DataFrame, rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
     """Return pairs of the page with the areas of the rows that they come from."""
-    return pairs.assign(area=areas_of(rows, totals, totals.area or ""))
+    return named_areas(pairs.assign(area=areas_of(rows, totals, totals.area or "")), totals)
 
 
 def outlines_beside(*pairs: Path | None) -> Path | None:
@@ -315,14 +319,14 @@ def read_table(
     write_totals(areas, folder / "totals.csv")
     report.outputs.append(folder / "totals.csv")
     buildings, hit = _worst_buildings(folder / "buildings.parquet")
-    # The pairs of the page have all columns
+    # Areas have names for people from here on
     return replace(
         results,
         tally=reader.tally,
         worst=reader.worst if reader.is_whole else results.worst,
         listed=reader.listed,
         shown=reader.shown,
-        areas=areas,
+        areas=named_areas(areas, table.totals),
         buildings=buildings,
         buildings_hit=hit,
     )

@@ -94,6 +94,9 @@ COAST_COLOUR, BORDER_COLOUR = "#51708A", "#8A6F86"
 MOST_LABELS, MOST_TOWNS = 12, 100
 TOWN_COLOUR = "#1F3A4D"
 
+#: Height of the place of the scale bar, share of the map.
+BAR_HEIGHT = 0.1
+
 #: Space around the points of a map, share of its longer side.
 MARGIN = 0.06
 
@@ -184,12 +187,13 @@ def draw_map(
     frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
     # Texts beside them, as far as there is room
-    labels = _Labels(axes, frame)
+    at_right = _is_at_bar(region, frame)
+    labels = _Labels(axes, frame, at_right)
     _draw_stations(axes, region, frame)
     _write_amplitudes(labels, region, language)
     _draw_coasts(axes, points, frame)
     _write_towns(labels, points)
-    _add_scale_bar(axes, frame, 0.03)
+    _add_scale_bar(axes, frame, 0.03, at_right)
     axes.set_title(counted(language, "overview_pairs", len(table)), fontsize=11)
     texts = LANGUAGES[language]
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
@@ -312,7 +316,7 @@ def _inside(places: FloatArray, frame: Frame) -> tuple[FloatArray, FloatArray, N
 class _Labels:
     """Texts beside places of a map, of which none touches an earlier one."""
 
-    def __init__(self, axes: Axes, frame: Frame) -> None:
+    def __init__(self, axes: Axes, frame: Frame, bar_at_right: bool) -> None:
         self.axes = axes
         box, tall = axes.get_window_extent(), frame.north - frame.south
         # The map fills its axes: degrees of latitude across, a little less as titles need room
@@ -322,8 +326,9 @@ class _Labels:
         # A letter of size 8 is 0.075 inches wide; the scale bar has its place
         letter = 0.075 * across / (box.width / Figure().dpi)
         self.letter = letter / frame.stretch, 1.8 * letter
-        bar = frame.west + 0.5 * (frame.east - frame.west), frame.south + 0.1 * tall
-        self.boxes = [(frame.west, frame.south, *bar)]
+        middle, top = 0.5 * (frame.west + frame.east), frame.south + BAR_HEIGHT * tall
+        sides = (middle, frame.east) if bar_at_right else (frame.west, middle)
+        self.boxes = [(sides[0], frame.south, sides[1], top)]
 
     def write(self, text: str, east: float, north: float, **style: Any) -> bool:
         """Write a text to the right of a place if it has room there."""
@@ -425,7 +430,15 @@ def _draw_coasts(axes: Axes, points: _Points, frame: Frame) -> None:
         axes.add_collection(drawn, autolim=False)
 
 
-def _add_scale_bar(axes: Axes, frame: Frame, height: float) -> None:
+def _is_at_bar(region: Region, frame: Frame) -> bool:
+    """Return whether the epicentre lies in the left half of the map at the height of its bar."""
+    east, north, inside = _inside(_epicentre(region), frame)
+    at_left = 2.0 * east < frame.west + frame.east
+    top = frame.south + BAR_HEIGHT * (frame.north - frame.south)
+    return bool((inside & at_left & (north < top)).any())
+
+
+def _add_scale_bar(axes: Axes, frame: Frame, height: float, at_right: bool = False) -> None:
     """Add a bar of a round length, about a quarter of the map, at a height of its axes."""
     quarter = 0.25 * frame.size
     unit = 10.0 ** np.floor(np.log10(quarter))
@@ -434,9 +447,12 @@ def _add_scale_bar(axes: Axes, frame: Frame, height: float) -> None:
     # As long as in the coordinates of the data
     degrees = length / METRES_PER_DEGREE / frame.stretch
     place = axes.get_xaxis_transform()
-    line = [frame.west, frame.west + degrees], [height, height]
+    # The text is on the side of the middle
+    start, inwards = (frame.east, -degrees) if at_right else (frame.west, degrees)
+    line = [start, start + inwards], [height, height]
     axes.plot(*line, color="black", linewidth=2.0, transform=place, clip_on=False)
-    axes.text(frame.west + 1.1 * degrees, height, text, transform=place, va="center", fontsize=8)
+    style: dict[str, Any] = {"ha": "right" if at_right else "left", "va": "center", "fontsize": 8}
+    axes.text(start + 1.1 * inwards, height, text, transform=place, **style)
 
 
 def _add_legend(

@@ -104,7 +104,7 @@ class Results:
     tally : PairTally
         Counts of all pairs.
     worst : DataFrame
-        The worst pairs with all columns and their areas, at most ``PAGE_PAIRS``.
+        The worst pairs with the columns of the page and their areas, at most ``PAGE_PAIRS``.
     listed : DataFrame
         The worst pairs for summary, KML and workbook.
     shown : DataFrame

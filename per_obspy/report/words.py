@@ -5,6 +5,10 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy.checks import FloatArray
 from per_obspy.errors import shortened
 from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
@@ -49,23 +53,23 @@ def name_text(name: object) -> str:
     return shortened(str(name), LONGEST_NAME)
 
 
-def length_text(metres: float, language: str = "en") -> str:
+def length_text(metres: float) -> str:
     """
     Return a length with two or three digits, in mm, cm or m; in words if it is unknown.
 
     Examples
     --------
-    >>> length_text(0.0), length_text(0.0042), length_text(0.123), length_text(2.5, "es")
-    ('0 cm', '4.2 mm', '12.3 cm', '2,5 m')
+    >>> length_text(0.0), length_text(0.0042), length_text(0.123), length_text(2.5)
+    ('0 cm', '4.2 mm', '12.3 cm', '2.5 m')
     """
     if not math.isfinite(metres):
-        return LANGUAGES[language]["unknown"]
+        return "unknown"
     # Half a unit of the last digit counts as the next one
     text = f"{metres:.3g} m"
     if abs(metres) < 0.9995:
         centimetres = abs(metres) >= 0.00995 or metres == 0.0
         text = f"{100 * metres:.3g} cm" if centimetres else f"{1000 * metres:.2g} mm"
-    return text.translate(marks(language))
+    return text
 
 
 def speed_text(metres_per_second: float, language: str = "en") -> str:
@@ -117,41 +121,41 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
     return [*judged, *described, *_prevention_lines(pair), *_flag_lines(pair)]
 
 
-def prevention_kind(pair: "Mapping[Any, Any] | pd.Series[Any]") -> str:
+def prevention_kind(
+    gap: ArrayLike, missing: ArrayLike, state: ArrayLike, risk_class: ArrayLike
+) -> NDArray[np.str_]:
     """
-    Return the case of the measures for a pair.
+    Return the case of the measures for pairs.
 
     ``unknown_gap`` and ``not_computed`` (the table has no demand) are no promise; ``gap``: a wider
     one is needed; ``in_doubt``: the gap is enough for the likeliest inputs, but the pair may pound
     at others; ``nothing``: it does not pound.
 
+    Parameters
+    ----------
+    gap, missing : (n_pairs,) array_like
+        Gap, and its :func:`missing_gap`, m; NaN where it is unknown.
+    state, risk_class : (n_pairs,) array_like of str
+        Of the ranked table.
+
     Examples
     --------
-    >>> prevention_kind({"gap": 0.1, "demand": 0.2, "state": "yes"}), prevention_kind({"gap": 0.1})
-    ('gap', 'not_computed')
+    >>> prevention_kind([0.1, np.nan], [0.2, 0.0], "yes", "low").tolist()
+    ['gap', 'unknown_gap']
     """
-    gap = number(pair, "gap")
-    if not math.isfinite(gap):
-        return "unknown_gap"
-    missing = missing_gap(pair)
-    if not math.isfinite(missing):
-        return "not_computed"
-    if missing > 0.0:
-        return "gap"
     # An assumed gap may be another one
-    if pair.get("risk_class") == UNKNOWN_CLASS:
-        return "unknown_gap"
-    return "nothing" if pair.get("state") == "no" else "in_doubt"
+    enough = np.where(np.equal(state, "no"), "nothing", "in_doubt")
+    enough = np.where(np.equal(risk_class, UNKNOWN_CLASS), "unknown_gap", enough)
+    kind = np.where(np.greater(missing, 0.0), "gap", enough)
+    kind = np.where(np.isfinite(missing), kind, "not_computed")
+    return np.where(np.isfinite(gap), kind, "unknown_gap")
 
 
-def missing_gap(pair: "Mapping[Any, Any] | pd.Series[Any]") -> float:
-    """Return demand minus gap where it is positive, m; NaN where either is unknown."""
-    missing = number(pair, "missing_gap")
-    if math.isfinite(missing):
-        return missing
+def missing_gap(known: ArrayLike, demand: ArrayLike, gap: ArrayLike) -> FloatArray:
+    """Return the missing gap of a table, else demand minus gap where it is positive, m, or NaN."""
     # Tables of other versions may lack the column
-    short = number(pair, "demand") - number(pair, "gap")
-    return max(short, 0.0) if math.isfinite(short) else math.nan
+    short = np.maximum(np.subtract(demand, gap), 0.0)
+    return np.where(np.isfinite(known), known, np.where(np.isfinite(short), short, np.nan))
 
 
 def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
@@ -262,13 +266,16 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Return sentences on measures that prevent or soften pounding."""
-    kind, lines = prevention_kind(pair), list[str]()
+    # As on the page
+    lines, gap = list[str](), number(pair, "gap")
+    missing = float(missing_gap(number(pair, "missing_gap"), number(pair, "demand"), gap))
+    names = _text(pair, "state"), _text(pair, "risk_class")
+    kind = str(prevention_kind(gap, missing, *names))
     if kind != "gap":
         return [PREVENTION_WORDS[kind].format(motion=_motion_name(pair))]
     # More gap, more damping, a softer contact
-    missing = length_text(missing_gap(pair))
     would = "would keep" if _text(pair, "spectrum") else "would have kept"
-    lines.append(f"A gap wider by {missing} {would} them apart.")
+    lines.append(f"A gap wider by {length_text(missing)} {would} them apart.")
     if not _text(pair, "station"):
         return [*lines, "Damping and bumpers: not computed without a record."]
     if (damping := number(pair, "supplemental_damping")) > 0:

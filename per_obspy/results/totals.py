@@ -19,6 +19,7 @@ from per_obspy.screening.totals import (
     PartialTotals,
     box_outlines,
     grid_cells,
+    hexagon_middles,
     hexagon_outlines,
     hexagons,
     joined_parts,
@@ -157,6 +158,26 @@ def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.o
     if settings.h3 is not None:
         return np.asarray(hexagons(longitude, latitude, settings.h3), dtype=object)
     return _with_cells(piece, named_cells(longitude, latitude, settings.cell))
+
+
+def named_areas(table: pd.DataFrame, settings: Totals) -> pd.DataFrame:
+    """
+    Return a table with its ``area`` as people read it: H3 cells by the way from the nearest town.
+
+    Examples
+    --------
+    >>> named_areas(pd.DataFrame({"area": ["882dadcb69fffff"]}), Totals(h3=8))["area"].tolist()
+    ['Kahramanmaraş (0.3 km S, 1.1 km E)']
+    """
+    if settings.h3 is None or table.empty:
+        return table
+    from h3 import average_hexagon_edge_length
+
+    # Each cell once
+    codes, cells = pd.factorize(table["area"])
+    east, north = hexagon_middles(cells).T
+    names = near_towns(east, north, average_hexagon_edge_length(settings.h3, "m"))
+    return table.assign(area=names[codes])
 
 
 def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:

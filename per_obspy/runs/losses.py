@@ -16,7 +16,7 @@ from per_obspy.inventory.files.headings import IDENTIFIER
 from per_obspy.inventory.files.raw_rows import RawRows
 from per_obspy.inventory.places import place_columns, place_names
 from per_obspy.results.coverage import Search, search_of_table
-from per_obspy.results.totals import PLACE, areas_of
+from per_obspy.results.totals import PLACE, areas_of, named_areas
 
 #: Coordinates of both buildings of a pair, without their number.
 _PLACE = ("longitude", "latitude")
@@ -118,7 +118,7 @@ def _lost_rows(rejected: Sequence[Rejection], rows: RawRows) -> NDArray[np.bool_
 
 
 def _cells_of(totals: Totals, table: pd.DataFrame) -> Sequence[str]:
-    """Return the place, hexagon or grid cell of each row whose coordinates can be read."""
+    """Return the place or cell of each row whose coordinates can be read, as people read it."""
     # The middle of both buildings, across the date line too, or the one that has coordinates
     east, far_east, north, far_north = (
         plain_numbers(table[f"{name}_{i}"]) for name in _PLACE for i in (1, 2)
@@ -133,7 +133,7 @@ def _cells_of(totals: Totals, table: pd.DataFrame) -> Sequence[str]:
     places = pd.DataFrame({"longitude": longitude, "latitude": latitude, **named})[usable]
     if places.empty:
         return []
-    return list(areas_of(places, totals, ""))
+    return list(named_areas(places.assign(area=areas_of(places, totals, "")), totals)["area"])
 
 
 def search_of_tables(tables: Mapping[Path, int]) -> Search | None:

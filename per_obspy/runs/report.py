@@ -28,7 +28,7 @@ from per_obspy.report.files import (
     write_report,
 )
 from per_obspy.report.hazard_figure import draw_gaps_for_target
-from per_obspy.report.page.packing import MOST_COLUMNS
+from per_obspy.report.page.document import page_columns
 from per_obspy.report.pair_figure import differing_pair
 from per_obspy.report.results import Drawings, Region, Results, Revision
 from per_obspy.report.statements import event_sentences
@@ -37,6 +37,7 @@ from per_obspy.report.texts import LANGUAGES, marks, written
 from per_obspy.report.words import name_text
 from per_obspy.results.coverage import Coverage
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
+from per_obspy.results.totals import totals_columns
 from per_obspy.runs.output_folder import WORST_PAIRS
 from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.run_facts import event_of_run, read_stations, revision_of_run
@@ -45,7 +46,7 @@ from per_obspy.runs.stations import file_stem, simulated_motion
 from per_obspy.runs.tasks.ground_files import read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.runs.worst_pairs import page_drawings, read_drawings, write_drawings
-from per_obspy.screening.columns import HAZARD
+from per_obspy.screening.columns import HAZARD, known_column
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import pounding_state, risk_class
@@ -59,9 +60,9 @@ def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Repor
     # A fault leaves the page without them
     if files := table_files(folder):
         with report.tried(folder / WORST_PAIRS):
-            # The leading columns are those of the package
             with ranked_table(files) as table:
-                worst = table.first(PAGE_PAIRS, table.schema.names[: 2 * MOST_COLUMNS])
+                names = [name for name in table.schema.names if known_column(name)]
+                worst = table.first(PAGE_PAIRS, names)
             write_drawings(page_drawings(settings, worst, stations), folder / WORST_PAIRS)
     return report
 
@@ -165,7 +166,7 @@ def _report_pairs(
         settings.pairs.file if settings.pairs else None, folder / "pairs.parquet"
     )
     with ranked_table(table_files(folder), columns) as table:
-        # The pieces may lack columns, the pairs of the page have all of them
+        # The pieces lack columns of the page
         worst = worst_pairs(table, settings.totals)
         pairs = _pair_table(settings, table.pieces(), table.pairs, settings.totals, outlines)
         results = replace(results, worst=worst, record=_record(worst, stations))
@@ -197,11 +198,9 @@ def _write_tiles(package: Path, report: Report) -> None:
 
 
 def worst_pairs(table: RankedTable, totals: Totals) -> pd.DataFrame:
-    """Return the worst pairs of a risk table with all columns and their areas."""
-    # The leading columns are those of the package, those of the inventory follow
-    area = [totals.area] if totals.area else []
-    names = table.schema.names[: 2 * MOST_COLUMNS]
-    worst = table.first(PAGE_PAIRS, [*names, *area])
+    """Return the worst pairs of a risk table with the columns of the page and their areas."""
+    names = [*page_columns(table.schema.names), *totals_columns(totals)]
+    worst = table.first(PAGE_PAIRS, names)
     return with_areas(worst, worst, totals)
 
 

@@ -91,7 +91,7 @@ def page_drawings(
     settings : Run
         Of the run.
     worst : DataFrame
-        Pairs of the page with all columns of the risk table.
+        Pairs of the page with the package's columns of the risk table.
     stations : sequence of FinishedStation
         With station files.
     """

@@ -66,6 +66,13 @@ def hexagon_outlines(cells: Iterable[str]) -> list[FloatArray]:
     return outlines
 
 
+def hexagon_middles(cells: Iterable[str]) -> FloatArray:
+    """Return the middles of H3 cells, (n_cells, 2), degrees east and north."""
+    from h3 import cell_to_latlng
+
+    return np.array([cell_to_latlng(cell)[::-1] for cell in cells]).reshape(-1, 2)
+
+
 def box_outlines(boxes: pd.DataFrame) -> FloatArray:
     """Return the corners of boxes ``west, south, east, north``, (n_boxes, 4, 2), degrees."""
     west, south, east, north = boxes[["west", "south", "east", "north"]].to_numpy(np.float64).T

@@ -15,6 +15,7 @@ from per_obspy.report.overview import (
     SHOWN_PLACES,
     SMALLEST,
     Region,
+    draw_map,
     draw_overview,
     frame_of,
     worst_places,
@@ -93,6 +94,23 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
     assert (chart.get_xlabel(), chart.get_ylabel()) == ("longitude (°E)", "latitude (°N)")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["severe: 1 pair", "high: 1 pair", "low: 2 pairs", "station", "epicentre"]
+
+
+@pytest.mark.parametrize("east", [20.0, 20.15, 20.3])
+def test_the_scale_bar_leaves_the_epicentre_free(east):
+    """Of a map around the pairs, whose edge may be anywhere near the epicentre."""
+    figure = Figure(figsize=(4.0, 4.0))
+    chart = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+    epicentre = (east, 59.9 - 0.007)
+    draw_map(chart, TABLE, REGION._replace(epicentre=epicentre), around_pairs=True)
+    figure.draw_without_rendering()
+    bar = next(line for line in chart.lines if line.get_linewidth() == 2.0)
+    text = next(text for text in chart.texts if text.get_text().endswith(" km"))
+    # The star has a radius of 6 points
+    x, y = chart.transData.transform(epicentre)
+    for part in (bar, text):
+        box = part.get_window_extent()
+        assert not (box.x0 - 8 < x < box.x1 + 8 and box.y0 - 8 < y < box.y1 + 8)
 
 
 def test_gaps_are_drawn_over_demands_in_centimetres(overview):

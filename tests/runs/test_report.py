@@ -112,7 +112,11 @@ KINDS += [('[totals]\narea = "position"\n', "Point")]
 
 
 @pytest.mark.parametrize(("kind", "shape"), KINDS)
-def test_totals_are_a_layer_too(copied, kind, shape):
+def test_totals_are_a_layer_too(copied, kind, shape, monkeypatch):
+    shown = list[Results]()
+    monkeypatch.setattr(
+        report_files, "write_page", lambda results, path: (shown.append(results), path.touch())
+    )
     write_configuration(copied, f"geopackage = true\npmtiles = true\n{PAIRS}{kind}")
     result = report(copied / "run.toml")
     assert result.record["faults"] == []
@@ -127,6 +131,10 @@ def test_totals_are_a_layer_too(copied, kind, shape):
     assert table["pairs"].sum() == result.record["counts"]["pairs"]
     if "h3" in kind:
         assert table["area"].str.fullmatch("86[0-9a-f]{7}f{6}").all()  # an H3 index of resolution 6
+        # people read the nearest town or degrees, on the page and elsewhere
+        names = set(shown[0].areas["area"])
+        assert not names & set(table["area"])
+        assert set(shown[0].worst["area"]) <= names
     # would catch a layer of pairs that has only the columns which totals need
     table = pd.read_parquet(copied / "out" / "risk.parquet")
     information = pyogrio.read_info(copied / "out" / "risk.gpkg", layer="pairs")

@@ -82,7 +82,9 @@ LARGEST, LARGEST_RATIO, _SMALL = 4 << 30, 200, 64 << 20
 Box = tuple[float, float, float, float]
 
 
-def read_raw_layer(file: Path, layer: str | None, box: Box | None = None) -> RawLayer:
+def read_raw_layer(
+    file: Path, layer: str | None, box: Box | None = None, around: Box | None = None
+) -> RawLayer:
     """
     Read a layer by the reader of the file's suffix.
 
@@ -97,6 +99,9 @@ def read_raw_layer(file: Path, layer: str | None, box: Box | None = None) -> Raw
     box : tuple of float, optional
         Only features whose own box touches this one, of GeoParquet in degrees; features are
         numbered among them.
+    around : tuple of float, optional
+        Shapes without attributes: of a GeoPackage, Shapefile or FlatGeobuf those that touch this
+        box, of other files all.
 
     Raises
     ------
@@ -111,7 +116,7 @@ def read_raw_layer(file: Path, layer: str | None, box: Box | None = None) -> Raw
     size = file.stat().st_size
     limits = Limits(120.0 + 5.0 * size / 2**20, (4 << 30) + 30 * size)
     try:
-        raw: RawLayer = read_layer_apart(limits, _read, file, layer, box)
+        raw: RawLayer = read_layer_apart(limits, _read, file, layer, box, around)
     except BeyondLimits as error:
         raise CatalogError(str(file), f"{error}: damaged, too large, or made to harm") from error
     return raw
@@ -158,7 +163,7 @@ def _wrong_beginning(file: Path) -> str:
     return ""
 
 
-def _read(file: Path, layer: str | None, box: Box | None = None) -> RawLayer:
+def _read(file: Path, layer: str | None, box: Box | None, around: Box | None) -> RawLayer:
     """Read a layer in the process of readers; messages name the file that may be packed."""
     source = str(file)
     try:
@@ -174,7 +179,7 @@ def _read(file: Path, layer: str | None, box: Box | None = None) -> RawLayer:
             if suffix in JSON_SUFFIXES and is_asset_json(head):
                 return read_asset_json(plain, source)
             if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
-                return _read_gdal(plain, layer)
+                return _read_gdal(plain, layer, around)
             readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
             if suffix in readers:
                 return readers[suffix](plain, source)
@@ -212,8 +217,8 @@ def _unpacked(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def _read_gdal(file: Path, layer: str | None) -> RawLayer:
-    """Read a layer with GDAL."""
+def _read_gdal(file: Path, layer: str | None, around: Box | None) -> RawLayer:
+    """Read a layer with GDAL, or its shapes around a place."""
     import pyogrio  # in the process of readers only
 
     require_own_drivers(pyogrio.list_drivers())
@@ -230,7 +235,8 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
                 crs, table = _areas(path)
             else:
                 name = _layer_name(file, pyogrio.list_layers(path), layer, views)
-                meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False)
+                options = _only_around(path, name, around) if around else {}
+                meta, table = pyogrio.raw.read_arrow(path, layer=name, force_2d=False, **options)
                 crs = meta["crs"]
     except (CatalogError, TryLater):
         raise
@@ -239,6 +245,23 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     # Messages of GDAL, except for a reference system that it does not know
     crs = (_declared_system(file) if suffix in JSON_SUFFIXES else None) or crs
     return _raw_layer(str(file), table, table.num_columns - 1, crs)
+
+
+def _only_around(path: Path, layer: str, around: Box) -> dict[str, Any]:
+    """Return what to read of a layer for the shapes around a place, without attributes."""
+    import pyogrio
+    import pyproj
+
+    # JSON is read whole anyway, and may be in another system than GDAL takes it for
+    if path.suffix.lower() in JSON_SUFFIXES:
+        return {"columns": []}
+    crs = pyogrio.read_info(path, layer=layer)["crs"]
+    try:
+        there = pyproj.Transformer.from_crs("OGC:CRS84", crs, always_xy=True)
+        box = there.transform_bounds(*around)
+    except (pyproj.exceptions.ProjError, TypeError):
+        return {"columns": []}
+    return {"columns": [], "bbox": box} if np.isfinite(box).all() else {"columns": []}
 
 
 def _areas(path: Path) -> tuple[str, pa.Table]:

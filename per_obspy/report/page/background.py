@@ -5,6 +5,8 @@ import sqlite3
 import struct
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,11 +23,17 @@ if TYPE_CHECKING:
 
 Shapes = NDArray[np.object_]
 
+#: West, south, east and north.
+Box = tuple[float, float, float, float]
+
 #: Archives of vector tiles: what they are, and how they begin.
 TILES = {
     ".pmtiles": ("PMTiles archive", b"PMTiles\x03"),
     ".mbtiles": ("MBTiles archive", b"SQLite format 3\x00"),
 }
+
+#: Lowest and highest longitudes and latitudes of tiles, degrees.
+_TILED = ([-180.0, -85.0], [180.0, 85.0])
 
 #: Tiles along the longer side of the region, at most: the finest level that has no more is read.
 MOST_TILES = 8
@@ -123,29 +131,36 @@ def read_background(
     if path.suffix.lower() in TILES:
         shapes, credit = _tile_shapes(path, layers, box)
     else:
-        shapes, credit = _layer_shapes(path, layers), ""
+        shapes, credit = _layer_shapes(path, layers, box), ""
     lines = _simplified(_near(shapes, box))
     if not lines.size:
         raise CatalogError(str(path), "has no line or outline near the pairs")
     return Background(_packed(lines), shortened(re.sub(r"<[^>]*>", "", credit), LONGEST_CREDIT))
 
 
-def _layer_shapes(path: Path, layers: Sequence[str]) -> Shapes:
-    """Return lines and outlines of the layers of a file, in degrees."""
+def _layer_shapes(path: Path, layers: Sequence[str], box: Box) -> Shapes:
+    """Return lines and outlines of the layers of a file, in degrees, at least those in a box."""
     import shapely
 
     from per_obspy.inventory.footprints.layer_files import read_raw_layer
     from per_obspy.inventory.footprints.layers import polygons, to_degrees, transformed
 
-    found = []
+    # Files have longitudes on either side of 180 degrees: all of theirs are needed there
+    found, around = [], box if len(_turns(box)) == 1 else (-180.0, -90.0, 180.0, 90.0)
     for layer in layers or (None,):
-        raw = read_raw_layer(path, layer)
+        raw = read_raw_layer(path, layer, around=around)
         transformer, _ = to_degrees(path, raw.crs)
         found.append(transformed(_as_lines(polygons(raw.wkb)), transformer))
     return np.concatenate(found) if found else np.array([], dtype=shapely.Geometry)
 
 
-def _tile_shapes(path: Path, layers: Sequence[str], box: Sequence[float]) -> tuple[Shapes, str]:
+def _turns(box: Box) -> list[float]:
+    """Return the degrees by which longitudes from -180 to 180 may be moved into a box."""
+    turns = (-360.0, 0.0, 360.0)
+    return [turn for turn in turns if box[0] < turn + 180.0 and box[2] > turn - 180.0]
+
+
+def _tile_shapes(path: Path, layers: Sequence[str], box: Box) -> tuple[Shapes, str]:
     """Return lines of an archive in degrees, else its outlines, and who made it."""
     import pyproj
 
@@ -153,13 +168,15 @@ def _tile_shapes(path: Path, layers: Sequence[str], box: Sequence[float]) -> tup
 
     projection = ("OGC:CRS84", "EPSG:3857")
     mercator = pyproj.Transformer.from_crs(*projection, always_xy=True)
-    # Tiles end at 85 degrees
-    west, south, east, north = np.clip(box, [-180, -85, -180, -85], [180, 85, 180, 85]).tolist()
-    corners = (*mercator.transform(west, south), *mercator.transform(east, north))
+    # Tiles end at 85 degrees, and on both sides of 180 degrees
+    boxes = []
+    for turn in _turns(box):
+        low, high = np.clip(np.reshape(box, (2, 2)) - [turn, 0.0], *_TILED).tolist()
+        boxes.append((*mercator.transform(*low), *mercator.transform(*high)))
     try:
         # Some megabytes: what a region has at the chosen level
         wkb, side, credit = read_tiles_apart(
-            Limits(120.0, 4 << 30), read_tiles, path, tuple(layers), corners
+            Limits(120.0, 4 << 30), read_tiles, path, tuple(layers), boxes
         )
     except BeyondLimits as error:
         raise CatalogError(str(path), f"{error}: damaged, too large, or made to harm") from error
@@ -179,7 +196,7 @@ def _streets(shapes: Shapes) -> Shapes:
 
 
 def read_tiles(
-    path: Path, layers: Sequence[str], corners: tuple[float, float, float, float]
+    path: Path, layers: Sequence[str], boxes: Sequence[Box]
 ) -> tuple["pa.Array", float, str]:
     """
     Return the shapes of an archive as WKB, the side of its tiles, m, and who made it.
@@ -190,8 +207,8 @@ def read_tiles(
         Archive of vector tiles.
     layers : sequence of str
         Names of layers, all without one.
-    corners : tuple of float
-        West, south, east and north in the projection of tiles, m.
+    boxes : sequence of tuple of float
+        West, south, east and north of the parts of a region in the projection of tiles, m.
     """
     import pyogrio  # in the process of readers only
 
@@ -205,8 +222,8 @@ def read_tiles(
             chosen = _chosen_layers(path, layers, names)
             # Layers have one description
             facts: dict[str, Any] = pyogrio.read_info(plain, layer=chosen[0])["dataset_metadata"]
-            level = _level(facts, corners)
-            shapes = _shapes_at(level, plain, chosen, corners)
+            level = _level(facts, boxes)
+            shapes = _shapes_at(level, plain, chosen, boxes)
     except CatalogError:
         raise
     except (RuntimeError, ValueError, TypeError, KeyError, sqlite3.Error) as error:
@@ -215,16 +232,15 @@ def read_tiles(
     return shapes, EQUATOR / 2.0**level, str(facts.get("attribution", ""))
 
 
-def _shapes_at(
-    level: int, path: Path, layers: Sequence[str], corners: Sequence[float]
-) -> "pa.Array":
+def _shapes_at(level: int, path: Path, layers: Sequence[str], boxes: Sequence[Box]) -> "pa.Array":
     """Return the shapes of a zoom level as WKB, bytes that can be sent to another process."""
     import pyarrow as pa
     import pyogrio
 
     # The stream of Arrow would not report the errors of tiles
-    options = {"ZOOM_LEVEL": str(level), "CLIP": "YES", "bbox": corners, "columns": []}
-    wkb = [pyogrio.raw.read(path, layer=name, **options)[2] for name in layers]
+    options = {"ZOOM_LEVEL": str(level), "CLIP": "YES", "columns": []}
+    parts = product(layers, boxes)
+    wkb = [pyogrio.raw.read(path, layer=name, bbox=box, **options)[2] for name, box in parts]
     return pa.array(np.concatenate(wkb), pa.large_binary())
 
 
@@ -238,9 +254,10 @@ def _chosen_layers(path: Path, layers: Sequence[str], names: Sequence[str]) -> S
     return layers or names
 
 
-def _level(facts: Mapping[str, Any], corners: Sequence[float]) -> int:
+def _level(facts: Mapping[str, Any], boxes: Sequence[Box]) -> int:
     """Return the finest level of an archive of which a region has few tiles."""
-    size = max(corners[2] - corners[0], corners[3] - corners[1], 1.0)
+    (_, south, _, north), *_ = boxes
+    size = max(sum(east - west for west, _, east, _ in boxes), north - south, 1.0)
     wanted = int(np.log2(MOST_TILES * EQUATOR / size))
     return int(np.clip(wanted, int(facts["minzoom"]), int(facts["maxzoom"])))
 
@@ -296,17 +313,14 @@ def _lines_of(corners: FloatArray, part: NDArray[np.int64]) -> Shapes:
     return np.asarray(shapely.linestrings(corners, indices=np.unique(part, return_inverse=True)[1]))
 
 
-def _near(lines: Shapes, box: Sequence[float]) -> Shapes:
+def _near(lines: Shapes, box: Box) -> Shapes:
     """Return the parts of lines (degrees) in a box, which may reach beyond 180 degrees."""
     import shapely
 
+    lines = lines[np.isfinite(shapely.bounds(lines)).all(axis=1)]
     # Longitudes of a file end at 180 degrees
-    bounds = shapely.bounds(lines)
-    lines = lines[np.isfinite(bounds).all(axis=1)]
-    if box[2] > 180.0:
-        lines = np.concatenate(
-            [lines, shapely.transform(lines, lambda xy: np.add(xy, [360.0, 0.0]))]
-        )
+    moved = [shapely.transform(lines, partial(np.add, [turn, 0.0])) for turn in _turns(box)]
+    lines = np.concatenate(moved)
     west, south, east, north = shapely.bounds(lines).T
     touches = (west <= box[2]) & (east >= box[0]) & (south <= box[3]) & (north >= box[1])
     return _as_lines(shapely.clip_by_rect(lines[touches], *box))

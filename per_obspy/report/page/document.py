@@ -4,11 +4,12 @@ import hashlib
 import math
 import re
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from per_obspy.constants import STANDARD_GRAVITY
@@ -16,12 +17,11 @@ from per_obspy.errors import shortened
 from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
 from per_obspy.report.page.packing import (
-    FRACTION_BITS,
     LONGEST_TEXT,
     PackedTable,
+    address_columns,
     addresses,
     encoded,
-    pack_export,
     pack_table,
     text_kind,
 )
@@ -45,9 +45,9 @@ from per_obspy.screening.ranking import EVERY_STATE
 #: Columns of a pair on the page, and their kinds.
 PAIR_KINDS = {
     "rank": "whole", "pair_id": "text", "state": "choice", "risk_class": "choice",
-    "probability": "number", "expected_impact_velocity": "number", "impact_velocity_84": "number",
+    "probability": "chance", "expected_impact_velocity": "number", "impact_velocity_84": "number",
     "expected_amplification": "number", "gap": "number", "demand": "number",
-    "demand_rule": "choice", "missing_gap": "number", "impacts": "number",
+    "demand_rule": "choice", "missing_gap": "number", "impacts": "whole",
     "impact_velocity_exact": "number", "amplification_exact_1": "number",
     "amplification_exact_2": "number", "flags": "names", "derived": "names", "area": "choice",
     "station": "choice", "distance": "number", "azimuth_used": "number",
@@ -61,9 +61,6 @@ PAIR_KINDS = {
     "bumper_restitution": "number", "prevention_kind": "choice", "worst_scenario": "choice",
     "annual_probability": "number", "gap_for_target": "number",
 }  # fmt: skip
-
-#: Largest and smallest probability below 1 and above 0 that single precision keeps apart from them.
-NEARLY_NEVER, NEARLY_SURE = 1e-30, 1.0 - 2.0**-FRACTION_BITS
 
 #: Pairs with a verdict, and those without one, in the bar of the coverage.
 SCREENED_COLOUR, LEFT_OUT_COLOUR = "#7A8B99", "#1B1B1B"
@@ -79,8 +76,8 @@ HIDDEN = (
 
 #: Columns of a building on the page, and their kinds.
 BUILDING_KINDS = {
-    "rank": "number", "building_id": "text", "probability_common": "number",
-    "neighbours": "number", "neighbours_that_can_hit": "number", "impacts": "number",
+    "rank": "whole", "building_id": "text", "probability_common": "chance",
+    "neighbours": "whole", "neighbours_that_can_hit": "whole", "impacts": "whole",
     "impact_velocity": "number", "position": "choice", "prevention": "choice",
 }  # fmt: skip
 
@@ -174,8 +171,14 @@ def _drawn(results: Results) -> dict[str, Any]:
     }
 
 
+def page_columns(names: Iterable[Any]) -> list[Any]:
+    """Return the columns of a table of pairs that the page shows or searches."""
+    known = list(names)
+    return [*(name for name in PAIR_KINDS if name in known), *address_columns(known)]
+
+
 def _tables(results: Results) -> list[PackedTable]:
-    """Return pairs, cells, buildings, and the columns of pairs that only the export needs."""
+    """Return pairs, cells and buildings."""
     cells = results.tally.cells.table()
     kinds = dict.fromkeys(("longitude", "latitude"), "place")
     kinds |= {str(name): "whole" for name in cells if name not in kinds}
@@ -187,24 +190,18 @@ def _tables(results: Results) -> list[PackedTable]:
         pack_table(pairs, PAIR_KINDS | {"address": text_kind(pairs, "address")}),
         pack_table(cells, kinds),
         pack_table(_buildings(results), BUILDING_KINDS),
-        pack_export(results.worst, PAIR_KINDS),
     ]
 
 
 def _with_measures(worst: pd.DataFrame) -> pd.DataFrame:
-    """Return pairs with the case of their measures, and probabilities that stay below 1."""
-    names = ("gap", "demand", "missing_gap", "state", "risk_class")
-    known = worst[[name for name in names if name in worst]].to_dict("records")
-    pairs = worst.assign(prevention_kind=[prevention_kind(pair) for pair in known])
-    if "demand" in worst:
-        pairs = pairs.assign(missing_gap=[missing_gap(pair) for pair in known])
-    if "probability" not in pairs:
-        return pairs
-    # Neither 0 nor 1 may come of the packing
-    chance = pairs["probability"]
-    open_chance = (chance > 0.0) & (chance < 1.0)
-    kept = chance.clip(NEARLY_NEVER, NEARLY_SURE).where(open_chance, chance)
-    return pairs.assign(probability=kept)
+    """Return pairs with the case of their measures."""
+    names = ("missing_gap", "demand", "gap")
+    known, demand, gap = (worst.get(name, np.nan) for name in names)
+    missing = missing_gap(known, demand, gap)
+    # A table of an ensemble has no demand
+    texts = (worst.get(name, "") for name in ("state", "risk_class"))
+    pairs = worst.assign(missing_gap=missing) if "demand" in worst else worst
+    return pairs.assign(prevention_kind=prevention_kind(gap, missing, *texts))
 
 
 def _buildings(results: Results) -> pd.DataFrame:

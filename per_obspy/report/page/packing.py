@@ -1,25 +1,31 @@
-"""Columns of a table as compact bytes for a browser: what the page shows, and what it exports."""
+"""Columns of a table as compact bytes for a browser."""
 
 import json
 import zlib
 from base64 import b64encode
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
 from per_obspy.errors import shortened
 from per_obspy.inventory.places import place_columns
+from per_obspy.results.table_files import CONTACT_DIGITS
+from per_obspy.screening.columns import BY_CONTACT
 
-#: Bits of the fraction of a number that are stored: four digits, which is more than any is known.
-FRACTION_BITS = 13
+#: Significant digits of numbers: more than any is known.
+DIGITS = 4
 
-#: Coordinates are whole millionths of a degree, 0.1 m; the smallest whole number means unknown.
+#: Power of ten of the smallest number that is told from 0.
+LOWEST = -300
+
+#: Coordinates are whole millionths of a degree, 0.1 m.
 PLACES_PER_DEGREE = 1e6
-UNKNOWN_PLACE = np.iinfo(np.int32).min
+
+#: Whole numbers that mean unknown and infinite.
+UNKNOWN, INFINITE = np.iinfo(np.int32).min, np.iinfo(np.int32).max
 
 #: Longest name on the page, characters: an inventory may have identifiers of any length.
 LONGEST_TEXT = 120
@@ -59,56 +65,98 @@ def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
     table : DataFrame
         Its rows keep their order.
     kinds : mapping of str to str
-        Column -> ``number`` (four digits), ``whole`` (all digits), ``place`` (degrees), ``choice``
-        (few different texts), ``names`` (words of the package, of which none may be cut) or
-        ``text``.
+        Column -> ``number`` (four digits, two by the contact law), ``chance`` (a probability),
+        ``whole`` (all digits), ``place`` (degrees), ``choice`` (few different texts), ``names``
+        (words of the package, of which none may be cut) or ``text``.
     """
     # Data follow each other in the order of the descriptions
     columns, pieces = list[dict[str, Any]](), list[bytes]()
+    places = dict[str, NDArray[np.int32]]()
     for name, kind in kinds.items():
         if name not in table:
             continue
-        described, data = _PACKERS[kind](table[name])
+        if kind == "place":
+            described, data = _places(table[name], places)
+        else:
+            described, data = _PACKERS[kind](table[name])
         columns.append({"name": name, "kind": kind, **described})
         pieces.append(data)
     return PackedTable({"count": len(table), "columns": columns}, b"".join(pieces))
 
 
 def _numbers(column: pd.Series) -> tuple[dict[str, Any], bytes]:
-    """Return numbers in single precision, their fractions rounded."""
-    numbers = column.to_numpy(dtype=np.float32, na_value=np.nan)
-    return {}, _planes(rounded(numbers))
+    """Return numbers with the digits of their column."""
+    digits = CONTACT_DIGITS if column.name in BY_CONTACT else DIGITS
+    return {"digits": digits}, _planes(decimals(_values(column), digits))
 
 
-def rounded(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
+def _chances(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return probabilities, of which none becomes 1 by rounding."""
+    chance, nearest = _values(column), 1.0 - 10.0**-DIGITS
+    chance = np.where(chance < 1.0, np.minimum(chance, nearest), chance)
+    return {"digits": DIGITS}, _planes(decimals(chance, DIGITS))
+
+
+def decimals(numbers: NDArray[np.float64], digits: int) -> NDArray[np.int32]:
     """
-    Round the fractions of numbers to ``FRACTION_BITS``, so that they take few bytes deflated.
+    Return the places of numbers among all decimal ones with some significant digits.
+
+    The first is ``10**LOWEST``, each power of ten has nine tenths of the next one; 0 stays, and
+    negative numbers have negative places.
 
     Examples
     --------
-    >>> rounded(np.array([0.1, np.inf], dtype=np.float32)).tolist()
-    [0.09999847412109375, inf]
+    >>> (decimals(np.array([1.0, 1.2, 9.96, 0.0]), 2) - decimals(np.array([1.0]), 2)).tolist()
+    [0, 2, 90, -27001]
     """
-    with np.errstate(invalid="ignore"):
-        fraction, exponent = np.frexp(numbers)
-        scale = np.float32(2.0 ** (FRACTION_BITS + 1))
-        return np.ldexp(np.rint(fraction * scale) / scale, exponent).astype(np.float32)
+    usable = np.isfinite(numbers) & (numbers != 0.0)
+    safe = np.where(usable, np.maximum(np.abs(numbers), 10.0**LOWEST), 1.0)
+    # A whole number of these digits and a power of ten; 9.96 has those of 10.0
+    power = np.floor(np.log10(safe))
+    first = 10 ** (digits - 1)
+    whole = np.rint(safe / 10.0**power * first) - first
+    place = np.where(usable, 1 + (power - LOWEST) * 9 * first + whole, 0.0)
+    place = np.where(np.isinf(numbers), INFINITE, place)
+    return np.where(np.isnan(numbers), UNKNOWN, np.copysign(place, numbers)).astype(np.int32)
+
+
+def _values(column: pd.Series) -> NDArray[np.float64]:
+    """Return the numbers of a column, NaN where there is none."""
+    return column.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def _wholes(column: pd.Series) -> tuple[dict[str, Any], bytes]:
     """Return whole numbers of up to nine digits."""
-    numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+    return {}, _planes(_whole(column))
+
+
+def _whole(column: pd.Series, unit: float = 1.0) -> NDArray[np.int32]:
+    """Return numbers in whole units, of which so many are 1."""
+    numbers = _values(column)
     known = np.isfinite(numbers)
-    whole = np.where(known, numbers, 0.0).astype(np.int32)
-    return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
+    whole = np.rint(np.where(known, numbers, 0.0) * unit).astype(np.int32)
+    return np.where(known, whole, np.int32(UNKNOWN))
 
 
-def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
-    """Return degrees as whole numbers."""
-    degrees = column.to_numpy(dtype=np.float64, na_value=np.nan)
-    known = np.isfinite(degrees)
-    whole = np.rint(np.where(known, degrees, 0.0) * PLACES_PER_DEGREE).astype(np.int32)
-    return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
+def _places(
+    column: pd.Series, places: dict[str, NDArray[np.int32]]
+) -> tuple[dict[str, Any], bytes]:
+    """
+    Return degrees as whole numbers: ends of a pair as steps from where they are expected.
+
+    Building 1 is expected in the middle of the pair, building 2 as far from it on the other side.
+    Numbers beyond 32 bits come round again here and in the browser.
+    """
+    axis = str(column.name).rpartition("_")[0]
+    before = [name for name in (axis, f"{axis}_1") if name in places]
+    whole = _whole(column, PLACES_PER_DEGREE)
+    places[str(column.name)], others = whole, [places[name] for name in before]
+    # Steps from there
+    if len(others) == 2:
+        whole = whole - (2 * others[0] - others[1])
+    elif others:
+        whole = whole - others[0]
+    return {"before": before}, _planes(whole)
 
 
 def _choices(column: pd.Series, longest: int = LONGEST_TEXT) -> tuple[dict[str, Any], bytes]:
@@ -142,8 +190,8 @@ def _planes(values: NDArray[Any]) -> bytes:
 
 _PACKERS = {
     "number": _numbers,
+    "chance": _chances,
     "whole": _wholes,
-    "place": _places,
     "choice": _choices,
     "names": _names,
     "text": _texts,
@@ -169,62 +217,6 @@ def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
     return b64encode(zlib.compress(data, LEVEL)).decode("ascii")
 
 
-#: Bytes of all columns for the export, deflated; the columns after them are left out.
-MOST_BYTES = 1_500_000
-
-#: Columns for the export: wide tables would make large pages.
-MOST_COLUMNS = 300
-
-
-def pack_export(pairs: pd.DataFrame, known: Collection[str]) -> PackedTable:
-    """
-    Pack the columns of pairs that the page does not show, in order, up to its size limit.
-
-    Parameters
-    ----------
-    pairs : DataFrame
-        The pairs of the page.
-    known : collection of str
-        Columns that the page holds already.
-
-    Returns
-    -------
-    PackedTable
-        Its description has ``left_out``, the names of columns for which there is no room.
-    """
-    # Columns of the package come first, those of the inventory after them
-    names = [str(name) for name in pairs if str(name) not in known]
-    packed, room, left_out = list[PackedTable](), MOST_BYTES, list[str]()
-    for number, name in enumerate(names):
-        column = pack_table(pairs, {name: _kind(pairs, name)})
-        texts = "".join(column.description["columns"][0].get("texts", ()))
-        size = len(zlib.compress(column.data + texts.encode("utf-8", "replace"), 1))
-        # A column without room leaves it to smaller ones
-        if number >= MOST_COLUMNS or size > room:
-            left_out.append(name[:LONGEST_TEXT])
-            continue
-        room -= size
-        packed.append(column)
-    columns = [column.description["columns"][0] for column in packed]
-    described = {"count": len(pairs), "columns": columns, "left_out": left_out}
-    return PackedTable(described, b"".join(column.data for column in packed))
-
-
-def _kind(pairs: pd.DataFrame, name: str) -> str:
-    """Return the packing of a column: four digits for numbers, all digits for whole numbers."""
-    column = pairs[name]
-    if is_bool_dtype(column) or not is_numeric_dtype(column):
-        return text_kind(pairs, name)
-    numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
-    numbers = numbers[np.isfinite(numbers)]
-    is_whole = numbers.size and bool((numbers == np.rint(numbers)).all())
-    largest = float(np.abs(numbers).max(initial=0.0))
-    # Identifiers may be numbers, of which no digit may be lost
-    if is_whole and 2.0**FRACTION_BITS < largest < 2.0**31:
-        return "whole"
-    return "number"
-
-
 def text_kind(pairs: pd.DataFrame, name: str) -> str:
     """Return the packing of a column of texts; few different texts are stored once each."""
     if name not in pairs:
@@ -241,8 +233,7 @@ def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
     >>> addresses(pd.DataFrame({"street_1": ["Calle 5"], "addr:city_1": ["Lima"]})).tolist()
     ['Calle 5, Lima']
     """
-    found = place_columns(map(str, pairs))
-    names = [name for name in pairs if str(name) == "place" or str(name) in found]
+    names = address_columns(pairs)
     if not names:
         return None
     # What is missing is empty
@@ -255,3 +246,10 @@ def _joined(names: Iterable[object]) -> str:
     """Join names in their order, without repetition."""
     texts = dict.fromkeys(str(name).strip() for name in names)
     return ", ".join(text for text in texts if text)
+
+
+def address_columns(names: Iterable[Any]) -> list[Any]:
+    """Return the columns of a table that say where a pair or building is."""
+    known = list(names)
+    places = place_columns(map(str, known))
+    return [name for name in known if str(name) == "place" or str(name) in places]

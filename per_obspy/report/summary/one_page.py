@@ -1,5 +1,6 @@
 """``summary.pdf``: one A4 page with a small map, made without a browser."""
 
+import math
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 from textwrap import wrap
@@ -26,7 +27,8 @@ from per_obspy.report.statements import (
     sureness,
 )
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
-from per_obspy.report.words import chance_text, length_text, number, speed_text
+from per_obspy.report.texts import LANGUAGES, written
+from per_obspy.report.words import chance_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
 PAGE = (8.27, 11.69)
@@ -224,9 +226,16 @@ def _number_cells(pair: dict[Hashable, Any], language: str) -> list[str]:
     return [
         speed_text(number(pair, "expected_impact_velocity"), language),
         chance_text(number(pair, "probability"), language),
-        length_text(number(pair, "gap"), language),
-        length_text(number(pair, "demand"), language) if "demand" in pair else "",
+        _centimetres(number(pair, "gap"), language),
+        _centimetres(number(pair, "demand"), language) if "demand" in pair else "",
     ]
+
+
+def _centimetres(metres: float, language: str) -> str:
+    """Return a length in the unit of the whole column; in words if it is unknown."""
+    if not math.isfinite(metres):
+        return LANGUAGES[language]["unknown"]
+    return f"{written(100.0 * metres, 1, language)} cm"
 
 
 def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> None:

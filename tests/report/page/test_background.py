@@ -12,6 +12,8 @@ import pyproj
 import shapely
 from pyogrio.raw import write
 
+from per_obspy.inventory.footprints import layers
+
 #: A street to the north-east, and a park of 300 m around a place, which lies across edges of tiles.
 PLACE = np.array([-90.513, 14.647])
 STREET = PLACE + np.linspace(-0.01, 0.01, 50)[:, None] * [1.0, 1.0]
@@ -86,11 +88,25 @@ def test_many_lines_are_simplified_until_they_fit(tmp_path, monkeypatch):
     assert np.ptp(found[:, 0]) > 0.019
 
 
-def test_a_layer_across_the_date_line_is_whole(tmp_path):
+@pytest.mark.parametrize("suffix", DRIVERS)
+def test_lines_across_the_date_line_are_whole(tmp_path, suffix):
     sides = [shapely.LineString([[x, -16.8], [x + 0.01, -16.8]]) for x in (179.99, -180.0)]
-    path = layer(tmp_path / "roads.gpkg", sides)
+    path = layer(tmp_path / f"roads{suffix}", sides)
     found = corners(read_background(path, (), np.array([179.99, 180.01]), np.array([-16.8, -16.8])))
-    assert [found[:, 0].min(), found[:, 0].max()] == pytest.approx([179.99, 180.01])
+    ends = [found[:, 0].min(), found[:, 0].max()]
+    assert ends == pytest.approx([179.99, 180.01], abs=STEP)
+
+
+def test_of_a_layer_only_the_surroundings_are_read(tmp_path, monkeypatch):
+    """A layer of a country would not fit into memory."""
+    read = []
+    streets = [shapely.LineString(np.add(STREET, [x, 0.0])) for x in (-36.0, 0.0, 1.0)]
+    path = layer(tmp_path / "roads.gpkg", streets)
+    polygons = layers.polygons
+    monkeypatch.setattr(layers, "polygons", lambda wkb: read.append(len(wkb)) or polygons(wkb))
+    found = corners(read_background(path, (), *PLACES))
+    assert read == [1]
+    assert np.abs(found - PLACE).max() < 0.011
 
 
 @pytest.mark.parametrize(

@@ -219,9 +219,12 @@ def test_the_same_facts_are_the_same_bytes(tmp_path):
 
 def test_the_spanish_page_keeps_its_texts_apart(page_text, monkeypatch):
     facts = replace(make_facts(buildings=True), language="es")
+    facts = replace(facts, listed=facts.listed.assign(gap=[0.0042, 1.2], demand=[0.305, np.nan]))
     figure, _ = page_text(facts, monkeypatch)
     drawn = " ".join(text.get_text() for text in figure.texts)
     assert "Movimiento SIMULADO" in drawn
     assert "Los peores edificios" in drawn
+    # One unit per column
+    assert all(cell in drawn for cell in ("0,4 cm", "120,0 cm", "30,5 cm", "sin dato"))
     figure.draw_without_rendering()
     assert all(text.get_window_extent().x1 <= figure.bbox.width for text in figure.texts)

@@ -245,8 +245,7 @@ class PairList {
   }
 
   csv() {
-    const stored = this.page.content.stored ? this.page.content.stored().column : {};
-    const column = { ...this.page.pairs.column, ...stored };
+    const { column } = this.page.pairs;
     const names = Object.keys(column).filter((name) => name !== "prevention_kind");
     const lines = [names.map(quoted).join(",")];
     for (const i of this.found) lines.push(names.map((name) => cellText(column[name], i)).join(","));
@@ -266,7 +265,7 @@ function cellText(values, i) {
   const value = values.codes ? values.texts[values.codes[i]] : values[i];
   if (typeof value === "number") {
     if (!Number.isFinite(value)) return Number.isNaN(value) ? "" : String(value).replace("Infinity", "inf");
-    return String(values instanceof Float32Array ? Number(value.toPrecision(4)) : value);
+    return String(Number(value.toPrecision(9)));
   }
   return quoted(value);
 }

@@ -278,11 +278,17 @@ class PairMap {
     }
   }
 
+  // Pixels of the epicentre, at the edge of the map where it is further away; far off without one
+  epicentre() {
+    const place = this.page.content.epicentre;
+    if (!place) return [Infinity, Infinity];
+    return [Math.min(Math.max(this.x(place[0]), 14), this.width - 14), Math.min(Math.max(this.y(place[1]), 14), this.height - 14)];
+  }
+
   drawEpicentre(pen) {
     const place = this.page.content.epicentre;
     if (!place) return;
-    const x = Math.min(Math.max(this.x(place[0]), 14), this.width - 14);
-    const y = Math.min(Math.max(this.y(place[1]), 14), this.height - 14);
+    const [x, y] = this.epicentre();
     const inside = x === this.x(place[0]) && y === this.y(place[1]);
     pen.beginPath();
     for (let i = 0; i < 10; i += 1) {
@@ -303,7 +309,9 @@ class PairMap {
     const power = 10 ** Math.floor(Math.log10(metres));
     const length = [5, 2, 1].map((digit) => digit * power).find((candidate) => candidate <= metres);
     const width = (length / 111200) * this.scale;
-    const [x, y] = [12, this.height - 14];
+    const [[left, top], y] = [this.epicentre(), this.height - 14];
+    // On the right where the epicentre is on the left
+    const x = left < width + 30 && top > y - 34 ? this.width - width - 12 : 12;
     pen.fillStyle = "#ffffffcc";
     pen.fillRect(x - 6, y - 20, width + 12, 28);
     pen.strokeStyle = pen.fillStyle = "#000";

@@ -17,12 +17,15 @@ class Page {
       return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
     };
     // With so many decimals; without a number of them two digits, of what the contact law leaves uncertain
+    const forms = {};
     this.number = (value, digits) => {
       if (!Number.isFinite(value)) return "–";
       // No minus before a zero
       const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
       const form = digits === undefined ? { minimumSignificantDigits: 2, maximumSignificantDigits: 2 } : { minimumFractionDigits: digits, maximumFractionDigits: digits };
-      return shown.toLocaleString(content.language, { ...form, useGrouping: "always" });
+      // Made once each: that takes longer than to write a number
+      forms[digits] = forms[digits] || new Intl.NumberFormat(content.language, { ...form, useGrouping: "always" });
+      return forms[digits].format(shown);
     };
     this.setGrades();
     this.setBuildings();
@@ -144,8 +147,6 @@ class Page {
     say("event", content.event);
     byId("revision").textContent = content.revision || "";
     say("expected", content.expected || "");
-    const lacks = (content.tables[3] && content.tables[3].left_out) || [];
-    byId("lacks").textContent = lacks.length ? this.t("export_lacks", { names: lacks.slice(0, 30).join(", ") }) : "";
     byId("simulated").hidden = !content.simulated;
     byId("simulated").textContent = this.t("simulated");
     for (const [value, label] of content.numbers) {
