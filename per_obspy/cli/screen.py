@@ -261,7 +261,8 @@ def _print_ensemble(result: "Result") -> None:
     counts = record["counts"]
     print(
         f"{len(record['scenarios'])} scenarios, {counts['pairs']} pairs; "
-        f"{counts['rejected_pair']} rejected"
+        f"{counts['rejected_pair']} rejected; without a probability: {counts['unknown_gap']} of "
+        f"unknown gap, {counts['missing_scenario']} that a scenario lacks"
     )
 
     # The worst pairs, and where everything is

@@ -209,17 +209,17 @@ def _inspections(hit: pd.DataFrame, results: Results) -> list[str]:
     # One area is no choice
     if len(areas) > 1 and "expected_pounding" in areas:
         most = areas.sort_values("expected_pounding", ascending=False)[:3]
-        places = [_placed_name(area, results.language) for _, area in most.iterrows()]
+        places = [_placed_name(area) for _, area in most.iterrows()]
         steps.append(texts["todo_areas"].format(names="; ".join(places)))
     return steps
 
 
-def _placed_name(area: "pd.Series[Any]", language: str) -> str:
+def _placed_name(area: "pd.Series[Any]") -> str:
     """Return the name of an area with the coordinates of its centre, unless they are the name."""
     if re.fullmatch(r"[\d.]+ [NS], [\d.]+ [EW]", str(area["area"])):
         return str(area["area"])
-    place = (written(area[name], 3, language) for name in ("latitude", "longitude"))
-    return f"{_names([area['area']])} ({' / '.join(place)})"
+    # As the search of the page and maps take it, with a decimal point
+    return f"{_names([area['area']])} ({area['latitude']:.3f}, {area['longitude']:.3f})"
 
 
 def _names(names: Sequence[object] | pd.Series) -> str:

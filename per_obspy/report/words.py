@@ -47,6 +47,9 @@ NO_IMPACT = (
     "outcome of uncertain periods, dampings, gap and motion at the site: {hit} of them hit."
 )
 
+#: Why a pair of unknown gap has a rank.
+RANKED_BY_NEED = "It is ranked by the gap that it needs, as if the buildings touched."
+
 
 def name_text(name: object) -> str:
     """Return a name of data on one line, shortened."""
@@ -178,15 +181,29 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
     # Why a pair without a verdict has a rank
     if _text(pair, "state") == UNKNOWN_STATE:
-        lines.append("It is ranked by the gap that it needs, as if the buildings touched.")
+        lines.append(RANKED_BY_NEED)
     # A run has one probability, an ensemble perhaps that of a year too
     if math.isfinite(number(pair, "probability")):
         lines.append(f"Probability of contact: {chance_text(number(pair, 'probability'))}.")
     if math.isfinite(number(pair, "annual_probability")):
         lines.append(f"Probability of contact in a year: {number(pair, 'annual_probability'):.2g}.")
     if _text(pair, "worst_scenario"):
+        lines += _lacking_lines(pair)
         lines.append(f"Worst scenario: {name_text(pair['worst_scenario'])}.")
     return lines
+
+
+def _lacking_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Return why a pair of an ensemble has no probability, as a list that is empty if it has."""
+    if math.isfinite(number(pair, "probability")):
+        return []
+    if not math.isfinite(number(pair, "gap")):
+        return [RANKED_BY_NEED]
+    # Scenarios whose column is empty
+    columns = (name for name in pair if name.startswith("probability_"))
+    lacking = [name.partition("_")[2] for name in columns if math.isnan(number(pair, name))]
+    names = name_text(", ".join(lacking))
+    return [f"It has no result in {names}, and is ranked by the other scenarios."]
 
 
 def _gap_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -51,7 +51,6 @@ _KINDS = (
     (r"^the positions .* apart", "positions too far apart"),
     (r"has no gap to itself", "a building paired with itself"),
     (r"^\d+ columns, the header has|has a line break", "broken line"),
-    (r"^no probability in ", "no probability in every scenario"),
     (r" in one scenario and ", "scenarios disagree"),
 )  # fmt: skip
 

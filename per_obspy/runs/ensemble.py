@@ -44,6 +44,8 @@ from per_obspy.runs.run import run
 from per_obspy.runs.scenario_runs import ScenarioRun, ScenarioRuns
 from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.ensemble import (
+    ORDER,
+    PERIODS,
     SAME,
     SEVERITY,
     ensemble_columns,
@@ -51,8 +53,8 @@ from per_obspy.screening.ensemble import (
     ensemble_rows,
 )
 
-#: Columns of a pair in each scenario, NaN where an earlier version made its table without them.
-OF_SCENARIO = ("probability", *SEVERITY, *DEMAND_SHARES)
+#: Columns of a risk table that depend on the scenario; NULL where an earlier version has none.
+OF_SCENARIO = ("probability", "demand", *SEVERITY, *DEMAND_SHARES)
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
@@ -70,13 +72,22 @@ class Scenarios(NamedTuple):
     target_rate: float = TARGET_RATE
 
 
+#: Numbers of pairs: all, and without a probability those of unknown gap, and the others.
+_COUNTS = """
+    SELECT 'pairs', count(*) FROM rows
+    UNION ALL SELECT 'unknown_gap', count(*) FROM rows WHERE probability IS NULL AND gap IS NULL
+    UNION ALL SELECT 'missing_scenario', count(*) FROM rows
+        WHERE probability IS NULL AND gap IS NOT NULL
+"""
+
 #: The rows in their order, with the rank before the other columns.
 _ORDERED = f"""
     COPY (
-        SELECT row_number() OVER () AS rank, *
+        SELECT row_number() OVER () AS rank, * EXCLUDE ({ORDER})
         FROM (
             SELECT * FROM rows
-            ORDER BY weighted_velocity DESC, expected_amplification DESC, probability DESC, pair_id
+            ORDER BY {ORDER} DESC, expected_amplification DESC NULLS LAST,
+                probability DESC NULLS LAST, pair_id
         )
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $statement}})
 """
@@ -110,13 +121,13 @@ def write_ensemble(
         with bounded_database(room) as database, written_whole(table) as part:
             database.register("rows", parquet_rows([rows]))
             database.execute(_ORDERED, {"path": str(part), "statement": statement})
+            counts = dict(database.execute(_COUNTS).fetchall())
         kinds = write_rejected(_rejections(scenarios, joined), rejected)
     # The worst rows as text, and the meaning of every column
     write_worst(table, csv_rows, text)
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
     write_described(described.values(), columns)
-    counts = {"pairs": pq.read_metadata(table.absolute()).num_rows, "rejected_pair": kinds["pair"]}
-    return files, counts
+    return files, {**counts, "rejected_pair": kinds["pair"]}
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
@@ -132,12 +143,13 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
-    zeros = ", ".join(f"0::DOUBLE AS {name}" for name in (*SAME, *OF_SCENARIO))
+    numbers = (*OF_SCENARIO, *SAME, *PERIODS)
+    zeros = ", ".join(f"0::DOUBLE AS {name}" for name in numbers)
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
     for number, table in enumerate(tables):
         if table:
             lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
-            wanted = ("pair_id", "configuration", *SAME, *OF_SCENARIO)
+            wanted = ("pair_id", "configuration", *numbers)
             names = ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
             rows.append(f"SELECT {number} AS scenario, {names} FROM table{number}")
     # Columns of probability and severity per scenario, extremes of columns that should be equal
@@ -147,7 +159,7 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
         for name in OF_SCENARIO
     ]
     columns += [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
-    columns.append("max(configuration) AS configuration")
+    columns += [f"max({name}) AS {name}" for name in ("configuration", *PERIODS)]
     return f"""
         COPY (
             SELECT pair_id, {", ".join(columns)} FROM ({" UNION ALL ".join(rows)})
@@ -166,7 +178,7 @@ def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
         for batch in table.iter_batches(ROWS):
             piece: pd.DataFrame = batch.to_pandas().rename(columns=names)
             # A batch of empty cells has no type
-            yield piece.astype(dict.fromkeys(names.values(), "float64"))
+            yield piece.astype(dict.fromkeys([*names.values(), *SAME, *PERIODS], "float64"))
 
 
 def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
@@ -174,7 +186,7 @@ def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
     # The rank is known when the rows are in order
     fields = [(name, _TYPES[column.dtype]) for name, column in described.items() if name != "rank"]
-    schema = pa.schema(fields)
+    schema = pa.schema([*fields, (ORDER, pa.float64())])
     with pq.ParquetWriter(path, schema) as writer:
         for piece in _pieces(scenarios, joined):
             rows = ensemble_rows(piece, scenarios.weights, scenarios.yearly, scenarios.target_rate)
@@ -182,9 +194,9 @@ def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
 
 
 def _rejections(scenarios: Scenarios, joined: Path) -> Iterator[Rejection]:
-    """Yield the pairs that a scenario lacks or that differ between scenarios."""
+    """Yield the pairs that differ between scenarios."""
     for piece in _pieces(scenarios, joined):
-        yield from ensemble_rejections(piece, scenarios.weights)
+        yield from ensemble_rejections(piece)
 
 
 #: Written last.
@@ -259,25 +271,21 @@ def _joined(
 ) -> dict[str, Any]:
     """Join the risk tables of the runs and return the results' part of ``ensemble.json``."""
     facts = {"name": settings.name, "simulated": str(simulated).lower()}
-    # A run without a usable pair has no table
-    tables = {
-        name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
-        for name, one in runs.items()
-    }
-    scenarios = Scenarios(tables, settings.weights, settings.yearly, settings.target_rate)
-    files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
+    joined = Scenarios(_risk_tables(runs), settings.weights, settings.yearly, settings.target_rate)
+    files, counts = write_ensemble(joined, folder, facts, settings.csv_rows)
     # Results of the runs know buildings, stations and records
     scenarios_run = {
         scenario.name: ScenarioRun(load(scenario.run, Run), runs[scenario.name].folder)
         for scenario in settings.scenario
     }
+    # Pairs that a run or a scenario lacks make a result partial
+    missing = counts["missing_scenario"]
+    losses = [counts["rejected_pair"], missing, *(one.record["partial"] for one in runs.values())]
     coverage = _coverage(runs, counts)
     made = report_ensemble(settings, folder, simulated, coverage, ScenarioRuns(scenarios_run))
-    # Rejections make a result partial, those of a run too
-    is_partial = any(result.record["partial"] for result in runs.values())
     return {
-        "state": "complete" if counts["pairs"] else "nothing_usable",
-        "partial": counts["rejected_pair"] > 0 or is_partial,
+        "state": "complete" if counts["pairs"] > missing else "nothing_usable",
+        "partial": any(losses),
         "counts": counts,
         "coverage": coverage.as_record(),
         "faults": made.faults,
@@ -287,14 +295,22 @@ def _joined(
     }
 
 
+def _risk_tables(runs: Mapping[str, Result]) -> dict[str, list[Path]]:
+    """Return the files of the risk table of each run; a run without a usable pair has none."""
+    return {
+        name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
+        for name, one in runs.items()
+    }
+
+
 def _coverage(runs: Mapping[str, Result], counts: Mapping[str, int]) -> Coverage:
-    """Return the coverage of an ensemble: pairs with a probability in every scenario."""
+    """Return the coverage of an ensemble: pairs that at least one scenario has."""
     of_runs = [Coverage.of_record(result.record) for result in runs.values()]
     fullest, widest = min(of_runs, key=_left_out), max(of_runs, key=lambda one: one.pairs)
     pairs, rejected = counts["pairs"], counts["rejected_pair"]
     rows = max(pairs + rejected, *(one.rows for one in of_runs))
     # Rows that every scenario leaves out have the reasons of the one that leaves out least
-    kinds = {"no probability in every scenario": rejected} if rejected else {}
+    kinds = {"scenarios disagree": rejected} if rejected else {}
     everywhere = rows - pairs - rejected
     if everywhere == _left_out(fullest):
         kinds |= fullest.left_out

@@ -49,7 +49,12 @@ from per_obspy.runs.worst_pairs import page_drawings, read_drawings, write_drawi
 from per_obspy.screening.columns import HAZARD, known_column
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
-from per_obspy.screening.ranking import pounding_state, risk_class
+from per_obspy.screening.ranking import (
+    UNKNOWN_CLASS,
+    UNKNOWN_STATE,
+    pounding_state,
+    risk_class,
+)
 from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
 
@@ -324,7 +329,7 @@ def report_ensemble(
     simulated : bool
         Whether the motion of a scenario is simulated.
     coverage : Coverage
-        Rows of the pair tables, and those that have a probability in every scenario.
+        Rows of the pair tables, and those that at least one scenario has.
     runs : ScenarioRuns
         Runs of the scenarios, which know buildings, stations and records.
     """
@@ -390,10 +395,15 @@ def _region(
 
 
 def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFrame:
-    """Return rows of an ensemble with the state and class of their probability and severity."""
+    """Return rows of an ensemble with state, class, and the flag of pairs that a scenario lacks."""
     chance = piece["probability"].to_numpy(np.float64)
     velocity = piece["weighted_velocity"].to_numpy(np.float64)
+    # Without a probability there is neither
+    unknown, flags = np.isnan(chance), piece.get("flags", pd.Series("", piece.index))
+    lacks = pd.Series(unknown & piece["gap"].notna(), piece.index)
+    no_class = unknown | flags.str.contains("unknown_gap").to_numpy(bool)
     return piece.assign(
-        state=pounding_state(chance, limits.states),
-        risk_class=risk_class(velocity, limits.classes),
+        state=np.where(unknown, UNKNOWN_STATE, pounding_state(chance, limits.states)),
+        risk_class=np.where(no_class, UNKNOWN_CLASS, risk_class(velocity, limits.classes)),
+        flags=flags.where(~lacks, (flags + " missing_scenario").str.strip()),
     )

@@ -29,7 +29,7 @@ OF_BUILDINGS = (
 #: Flags that do not depend on the motion.
 OF_PAIRS = (
     "derived_inputs", "derived_period", "equal_by_formula", "floor_to_column", "touching",
-    *ROW_SUSPICIONS,
+    "unknown_gap", *ROW_SUSPICIONS,
 )  # fmt: skip
 
 
@@ -96,23 +96,26 @@ class ScenarioRuns:
         query, columns = "SELECT * FROM pairs", self._columns()
         with bounded_database(table.parent) as database:
             database.register("pairs", parquet_rows([table]))
-            # Pairs of both tables have the same names
-            if self.first is not None and columns:
-                database.register("known", parquet_rows(self.first.risk, ["pair_id", *columns]))
-                named = ", ".join(f'known."{name}"' for name in columns)
-                query = f"SELECT pairs.*, {named} FROM pairs LEFT JOIN known USING (pair_id)"
+            # Pairs of all tables have the same names
+            if columns:
+                for number, (run, names) in enumerate(columns):
+                    database.register(f"run{number}", parquet_rows(run.risk, ["pair_id", *names]))
+                query = f"""
+                    SELECT * FROM pairs LEFT JOIN ({_of_first_runs(len(columns))}) USING (pair_id)
+                """
             for batch in batches(database, f"{query} ORDER BY rank", ROWS):
                 yield _with_flags_of_pairs(batch.to_pandas())
 
-    def _columns(self) -> list[str]:
-        """Return the columns that the ensemble takes from its first run."""
-        if self.first is None:
-            return []
-        area = self.first.settings.totals.area or PLACE
+    def _columns(self) -> list[tuple[ScenarioRun, list[str]]]:
+        """Return each run with the columns that the ensemble takes from it."""
+        area = self.totals().area or PLACE
         wanted = dict.fromkeys([*OF_BUILDINGS, "flags", area])
-        known = set(pq.read_schema(self.first.risk[0].absolute()).names)
-        # Names with a quotation mark are not quoted twice
-        return [name for name in wanted if name in known and '"' not in name]
+        tables = []
+        for run in self.runs.values():
+            known = set(pq.read_schema(run.risk[0].absolute()).names)
+            # Names with a quotation mark are not quoted twice
+            tables.append((run, [name for name in wanted if name in known and '"' not in name]))
+        return tables
 
     def stations(self) -> pd.DataFrame:
         """Return the stations of all runs, each with the name of its scenario."""
@@ -137,6 +140,15 @@ class ScenarioRuns:
                 ranked = rows.merge(pairs[["pair_id", "rank"]], on="pair_id")
                 found |= pair_histories(ranked, _stations(run))
         return found
+
+
+def _of_first_runs(count: int) -> str:
+    """Return a query for the rows of all pairs, each of the first run that has it."""
+    return " UNION ALL BY NAME ".join(
+        f"SELECT * FROM run{number}"
+        + "".join(f" ANTI JOIN run{earlier} USING (pair_id)" for earlier in range(number))
+        for number in range(count)
+    )
 
 
 def _stations(run: ScenarioRun) -> Sequence[Any]:

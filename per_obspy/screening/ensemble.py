@@ -14,6 +14,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.screening.columns import DEMAND_SHARES, HAZARD
 from per_obspy.screening.population import at_rows
+from per_obspy.screening.ranking import velocity_of_unknown
 from per_obspy.screening.values import BoolArray, Both, Columns, IndexArray
 
 
@@ -111,9 +112,21 @@ SEVERITY = {
     "expected_amplification": 1.0,
 }
 
+#: Periods of both buildings, which give unknown gaps their place among the others.
+PERIODS = ("period_1", "period_2")
+
+#: Column by which pairs are ordered, m/s: ``weighted_velocity``, or what stands for it.
+ORDER = "order_velocity"
+
 #: Columns that do not depend on the scenarios; ``probability`` is the third.
 JOINED = (
-    Column("rank", "int64", "", "1 is the worst: by weighted_velocity, then amplification"),
+    Column(
+        "rank",
+        "int64",
+        "",
+        "1 is the worst: by weighted_velocity, then amplification; an unknown gap by the gap that "
+        "is needed, a pair that a scenario lacks by the other scenarios",
+    ),
     Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
     Column(
         "annual_probability",
@@ -158,11 +171,11 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     """
     unit = "/year" if yearly else ""
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
-    chance = f"of pounding, given that one of these happens: {scenarios}"
+    chance = f"of pounding, given that one of these happens: {scenarios}; empty if one lacks it"
     columns = [*JOINED[:2], Column("probability", "float64", "1", chance), *JOINED[2:]]
     # Columns of the scenarios follow the joined ones
     for name in weights:
-        meaning = f"of pounding in scenario {name}"
+        meaning = f"of pounding in scenario {name}; empty: gap unknown, or no row there"
         columns.append(Column(f"probability_{name}", "float64", "1", meaning))
     columns += [(COLUMNS | COMPLETED)[name] for name in SAME]
     columns += [HAZARD[name] for name in GAPS]
@@ -183,9 +196,10 @@ def ensemble_rows(
     Parameters
     ----------
     joined : DataFrame
-        ``pair_id`` and ``configuration``; ``probability_<name>`` and the columns of ``SEVERITY`` of
-        each scenario, such as ``weighted_velocity_<name>`` (m/s); and the smallest and largest
-        value in any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
+        ``pair_id``, ``configuration`` and ``PERIODS`` (s); ``probability_<name>``,
+        ``demand_<name>`` (m) and the columns of ``SEVERITY`` of each scenario, such as
+        ``weighted_velocity_<name>`` (m/s); and the smallest and largest value in any scenario of
+        each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
     weights : mapping of str to float
         Weight of each scenario; see :func:`conditional_probability`.
     yearly : bool
@@ -197,31 +211,22 @@ def ensemble_rows(
     Returns
     -------
     DataFrame
-        Columns of :func:`ensemble_columns` without ``rank``, in the order of the rows; without the
-        pairs that :func:`ensemble_rejections` names.
+        Columns of :func:`ensemble_columns` without ``rank``, and ``ORDER``, in the order of the
+        rows; without the pairs that :func:`ensemble_rejections` names. Probabilities and severities
+        are NaN where a scenario has none.
     """
-    rows = joined[_comparable(joined, weights)].reset_index(drop=True)
-    weight = np.array(list(weights.values()))
-    pounding, *severities = (
-        rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64).T
-        for name in ("probability", *SEVERITY)
-    )
-    # Probabilities and severities over all scenarios
-    columns: Columns = {"probability": conditional_probability(pounding, weight)}
-    if yearly:
-        columns["annual_probability"] = annual_probability(pounding, weight)
-        quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
-        demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
-        needed = gap_for_rate(demands, weight, target_rate)
-        missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
-        columns |= dict(zip(GAPS, (needed, missing), strict=True))
-    for severity, (name, unknown) in zip(severities, SEVERITY.items(), strict=True):
-        beyond = np.nan_to_num(severity - unknown)
-        columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
-    # the hardest impact
-    columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
+    rows = joined[_comparable(joined)].reset_index(drop=True)
+    weight, velocity = np.array(list(weights.values())), _order_velocities(rows, weights)
+    pounding = _of_scenarios(rows, "probability", weights)
+    # Rank and hardest impact are of the scenarios that have the pair
+    columns = {
+        **_joint_columns(rows, weights, yearly),
+        **(_gap_columns(rows, weights, target_rate) if yearly else {}),
+        ORDER: _mean_of_known(velocity, weight),
+        "worst_scenario": np.array(list(weights), dtype=object)[_worst(pounding, velocity)],
+    }
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
-    return rows.assign(**columns)[names]
+    return rows.assign(**columns)[[*names, ORDER]]
 
 
 def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatArray:
@@ -263,40 +268,81 @@ def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatAr
     return np.where(np.isnan(ln_demand).any(axis=(0, 1)), np.nan, gap)
 
 
-def _worst(pounding: FloatArray, velocity: FloatArray, *_: FloatArray) -> IndexArray:
+def _of_scenarios(rows: pd.DataFrame, name: str, weights: Mapping[str, float]) -> FloatArray:
+    """Return a column of every scenario, (n_scenarios, n_pairs)."""
+    return rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64).T
+
+
+def _joint_columns(rows: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> Columns:
+    """Return probabilities and severities over all scenarios, NaN where one has none."""
+    pounding, weight = _of_scenarios(rows, "probability", weights), np.array([*weights.values()])
+    is_known = ~np.isnan(pounding).any(axis=0)
+    chance = np.where(is_known, pounding, 0.0)
+    columns: Columns = {"probability": conditional_probability(chance, weight)}
+    if yearly:
+        columns["annual_probability"] = annual_probability(chance, weight)
+    # A severity that is unknown is that without contact
+    for name, unknown in SEVERITY.items():
+        beyond = np.nan_to_num(_of_scenarios(rows, name, weights) - unknown)
+        columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
+    return {name: np.where(is_known, column, np.nan) for name, column in columns.items()}
+
+
+def _gap_columns(rows: pd.DataFrame, weights: Mapping[str, float], target_rate: float) -> Columns:
+    """Return the gap that the target asks for, and by how much the gap is too small, m."""
+    quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
+    demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
+    needed = gap_for_rate(demands, np.array([*weights.values()]), target_rate)
+    missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
+    return dict(zip(GAPS, (needed, missing), strict=True))
+
+
+def _order_velocities(rows: pd.DataFrame, weights: Mapping[str, float]) -> FloatArray:
+    """Return the velocity that ranks each pair in each scenario, m/s; NaN in one that lacks it."""
+    velocities = []
+    for name in weights:
+        motion = ("probability", "weighted_velocity", "demand")
+        pairs = rows[[*PERIODS]].assign(**{column: rows[f"{column}_{name}"] for column in motion})
+        # As in a run: an unknown gap counts as if the buildings touched
+        velocity = pairs["weighted_velocity"].fillna(0.0).to_numpy() + velocity_of_unknown(pairs)
+        lacks = pairs[["probability", "demand"]].isna().all(axis=1)
+        velocities.append(np.where(lacks, np.nan, velocity))
+    return np.array(velocities)
+
+
+def _mean_of_known(velocity: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the weighted mean over the scenarios that have a pair; 0 where their weight is 0."""
+    is_known = ~np.isnan(velocity)
+    total = _weighted_sum(is_known.astype(float), weight)
+    mean = np.zeros(total.shape)
+    np.divide(_weighted_sum(np.nan_to_num(velocity), weight), total, out=mean, where=total > 0.0)
+    return mean
+
+
+def _worst(pounding: FloatArray, velocity: FloatArray) -> IndexArray:
     """Return the scenario of the hardest impact of each pair; of equal ones the likeliest."""
-    order = np.lexsort((-pounding, -np.nan_to_num(velocity)), axis=0)
+    # NaN is last in either order
+    order = np.lexsort((-pounding, -velocity), axis=0)
     return np.asarray(order[0])
 
 
-def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:
-    """Yield rejections of pairs without a probability in a scenario, or with differing data."""
-    for row in joined[~_comparable(joined, weights)].to_dict("records"):
-        reasons = []
-        lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
-        if lacking:
-            names = ", ".join(lacking)
-            reasons.append(
-                f"no probability in {names}: not in its inventory, rejected there, or its gap is "
-                "unknown"
-            )
-
+def ensemble_rejections(joined: pd.DataFrame) -> Iterator[Rejection]:
+    """Yield rejections of pairs whose data differ between scenarios."""
+    for row in joined[~_comparable(joined)].to_dict("records"):
         # Smallest and largest value of columns that must be the same
-        for name, unit in SAME.items():
-            smallest, largest = row[name], row[f"{name}_largest"]
-            # An unknown gap is NaN in all of them
-            if smallest != largest and smallest == smallest:
-                reasons.append(
-                    f"{name} = {smallest:.9g} {unit} in one scenario "
-                    f"and {largest:.9g} {unit} in another"
-                )
-        yield Rejection("pair", str(row["pair_id"]), "", None, tuple(reasons))
+        reasons = tuple(
+            f"{name} = {row[name]:.9g} {unit} in one scenario "
+            f"and {row[f'{name}_largest']:.9g} {unit} in another"
+            for name, unit in SAME.items()
+            if row[name] < row[f"{name}_largest"]
+        )
+        yield Rejection("pair", str(row["pair_id"]), "", None, reasons)
 
 
-def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> BoolArray:
-    """Return a mask of pairs with a probability in every scenario and equal data in all."""
-    names = [f"probability_{name}" for name in weights]
-    comparable: BoolArray = joined[names].notna().all(axis=1).to_numpy()
+def _comparable(joined: pd.DataFrame) -> BoolArray:
+    """Return a mask of pairs with equal data in all scenarios that have them."""
+    comparable = np.ones(len(joined), dtype=bool)
     for name in SAME:
-        comparable = comparable & (joined[name] == joined[f"{name}_largest"]).to_numpy()
+        # An unknown gap is NaN in all of them
+        comparable &= ~(joined[name] < joined[f"{name}_largest"]).to_numpy()
     return comparable

@@ -40,6 +40,10 @@ FLAGS: dict[str, str] = {
         "the pair table gives no gap: the demand is the gap needed; probability, state and impacts "
         "are empty, or those of the gap that the configuration assumes"
     ),
+    "missing_scenario": (
+        "a scenario of the ensemble has no result for the pair: it has no probability, and "
+        "is ranked by the other scenarios"
+    ),
     "doubtful_cell": (
         "a cell of the pair table was not understood and is left empty, or a gap is a range, an "
         "estimate or a limit: see cell_notes"

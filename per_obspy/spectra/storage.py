@@ -48,7 +48,9 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
                 zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
             )
             stored.setncatts(variable.attrs)
-            own = [place for place in places if {*dataset.variables[place].dims} <= {*variable.dims}]
+            own = [
+                place for place in places if {*dataset.variables[place].dims} <= {*variable.dims}
+            ]
             if own and not is_coordinate:
                 stored.coordinates = " ".join(own)
             stored[...] = variable.values.astype(object) if is_text else variable.values

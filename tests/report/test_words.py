@@ -74,9 +74,15 @@ def test_a_rank_is_explained_where_the_record_shows_no_impact():
     quiet = {"impacts": 0, "expected_impact_velocity": 0.0, "probability": 0.0, "state": "no"}
     assert not any("outcome" in line for line in pair_lines(PAIR | quiet))
     unknown = {"state": "unknown", "gap": np.nan, "probability": np.nan, "impacts": np.nan}
-    assert "It is ranked by the gap that it needs, as if the buildings touched." in pair_lines(
-        PAIR | unknown | {"expected_impact_velocity": np.nan}
-    )
+    needed = "It is ranked by the gap that it needs, as if the buildings touched."
+    assert needed in pair_lines(PAIR | unknown | {"expected_impact_velocity": np.nan})
+    # An ensemble has no state, but a probability in each scenario
+    joined = {"pair_id": "P7", "rank": 3, "worst_scenario": "near", "probability": np.nan}
+    joined |= {"probability_near": 0.4, "probability_far, far": np.nan}
+    assert needed in pair_lines(joined | {"gap": np.nan})
+    lines = pair_lines(joined | {"gap": 0.1})
+    assert "It has no result in far, far, and is ranked by the other scenarios." in lines
+    assert needed not in lines
 
 
 BARE = {"pair_id": "P7", "rank": 1, "gap": 0.3, "demand": 0.1, "state": "no"}

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.cli import application
 
-from .small_run import SPECTRA
+from .small_run import SPECTRA, page_content, real_reports
 
 pytestmark = pytest.mark.usefixtures("plain_reports")
 
@@ -77,7 +77,7 @@ def test_every_scenario_is_run_and_the_probabilities_are_joined(copied, capsys):
     assert _call(copied) == 0
     out, err = capsys.readouterr()
     assert "SIMULATED" in out
-    assert "2 scenarios, 3 pairs; 0 rejected" in out
+    assert "2 scenarios, 3 pairs; 0 rejected; without a probability: 0 of unknown gap, 0 " in out
     assert "small: stations: 1 of 1" in err
     assert "large: stations" not in err  # it was done
     table = pd.read_parquet(copied / "both" / "ensemble.parquet").set_index("pair_id")
@@ -121,17 +121,46 @@ def test_the_record_of_an_ensemble_names_its_runs(copied, capsys):
     capsys.readouterr()
 
 
-def test_runs_with_different_inventories_reject_what_they_do_not_share(copied, capsys):
-    (copied / "fewer.csv").write_text(PAIRS.replace("a,0.3,", "d,0.3,").replace("0.10", "0.20"))
+def test_pairs_of_unknown_gap_or_of_one_scenario_are_ranked_and_shown(copied, capsys):
+    """One pair is in the first inventory, one in the second, one has no gap, one two of them."""
+    pairs = PAIRS.replace("c,0.3,", "u,0.3,").replace("12,0.9,0.0", "12,0.9,")
+    (copied / "pairs.csv").write_text(pairs)
+    (copied / "fewer.csv").write_text(pairs.replace("a,0.3,", "d,0.3,").replace("0.10", "0.20"))
     text = (copied / "small.toml").read_text()
     (copied / "small.toml").write_text(text.replace("pairs.csv", "fewer.csv"))
-    assert _call(copied) == 0
-    # a is in the first only, d in the second only, b differs
-    assert "1 pairs; 3 rejected" in capsys.readouterr().out
+    # the page of the ensemble itself is read below
+    with real_reports():
+        assert _call(copied) == 0
+    out = capsys.readouterr().out
+    counts = "3 pairs; 1 rejected; without a probability: 1 of unknown gap, 2 that a scenario lacks"
+    assert counts in out
     rejected = pd.read_csv(copied / "both" / "rejected.csv").set_index("name")["reasons"]
-    assert rejected["a"].startswith("no probability in small")
-    assert rejected["d"].startswith("no probability in large")
-    assert rejected["b"] == "gap = 0.1 m in one scenario and 0.2 m in another"
+    assert rejected.to_dict() == {"b": "gap = 0.1 m in one scenario and 0.2 m in another"}
+    table = pd.read_parquet(copied / "both" / "ensemble.parquet").set_index("pair_id")
+    # by the scenario that has them, and by the gaps that both ask for
+    large, small = (
+        pd.read_parquet(copied / name / "risk.parquet").set_index("pair_id")
+        for name in ("large", "small")
+    )
+    need = 0.25 * large.loc["u", "demand"] + 0.75 * small.loc["u", "demand"]
+    velocity = {
+        "u": 0.5 * np.pi * (1 / 0.3 + 1 / 0.9) * need,
+        "a": large.loc["a", "weighted_velocity"], "d": small.loc["d", "weighted_velocity"],
+    }  # fmt: skip
+    assert table.index.tolist() == sorted(velocity, key=velocity.get, reverse=True)
+    record = json.loads((copied / "both" / "ensemble.json").read_text())
+    assert record["partial"]
+    assert record["coverage"]["left_out"] == {"scenarios disagree": 1}
+    # the page says why none of them has a verdict, and knows the buildings of each
+    content = page_content(copied / "both" / "report.html")
+    assert [part[:2] for part in content["coverage_bar"]] == [
+        ["screened", 0], ["no verdict", 3], ["left out", 1],
+    ]  # fmt: skip
+    assert content["alert"]["sentence"].startswith("No pair has a probability in every scenario")
+    columns = {column["name"]: column for column in content["tables"][0]["columns"]}
+    assert columns["state"]["texts"] == ["unknown"]
+    assert {"unknown_gap", "missing_scenario"} <= set(" ".join(columns["flags"]["texts"]).split())
+    assert "longitude_2" in columns
 
 
 def test_nothing_usable_in_a_scenario_exits_with_3(copied, capsys):

@@ -32,6 +32,9 @@ def tables():
         expected_impact_velocity=random.uniform(0, 1, COUNT),
         expected_amplification=1.2,
         configuration="tall_beside_low",
+        demand=0.1,
+        period_1=0.4,
+        period_2=0.8,
     )
     pairs["weighted_velocity"] = 1.5 * pairs["expected_impact_velocity"]
     # Each lacks a pair of the other
@@ -53,12 +56,24 @@ def _written(tables, folder, csv_rows=1000, yearly=True):
     return write_ensemble(scenarios, folder / "out", {"simulated": "true"}, csv_rows)
 
 
+def _counts(pairs=COUNT, unknown_gap=0, missing_scenario=0):
+    """Return the counts of an ensemble without a rejection."""
+    lacking = {"unknown_gap": unknown_gap, "missing_scenario": missing_scenario}
+    return {"pairs": pairs, "rejected_pair": 0} | lacking
+
+
 def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     _, counts = _written(tables, tmp_path)
-    assert counts == {"pairs": COUNT - 2, "rejected_pair": 2}
+    assert counts == _counts(missing_scenario=2)
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
-    assert table["rank"].tolist() == list(range(1, COUNT - 1))
-    assert table["weighted_velocity"].is_monotonic_decreasing
+    assert table["rank"].tolist() == list(range(1, COUNT + 1))
+    known = table[table["probability"].notna()]
+    assert known["weighted_velocity"].is_monotonic_decreasing
+    # the other two stand where the one scenario that has them puts them
+    for name, risk in (("p007", tables["Far, far away"]), ("p009", tables["near"])):
+        (rank,) = table.loc[table["pair_id"] == name, "rank"]
+        velocity = risk.set_index("pair_id").loc[name, "weighted_velocity"]
+        assert rank - 2 <= (known["weighted_velocity"] > velocity).sum() < rank
     assert set(table["configuration"]) == {"tall_beside_low"}
     # joined by pandas instead: would catch rows joined by position, or scenarios that changed
     # places
@@ -71,7 +86,8 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     assert_allclose(
         table["annual_probability"], 1 - np.exp(-0.02 * near.to_numpy() - 0.01 * far.to_numpy())
     )
-    gaps = tables["near"].set_index("pair_id")["gap"].reindex(table["pair_id"])
+    gaps = tables["near"].combine_first(tables["Far, far away"])
+    gaps = gaps.set_index("pair_id")["gap"].reindex(table["pair_id"])
     assert_allclose(table["gap"], gaps, rtol=0)
 
 
@@ -84,10 +100,15 @@ def test_ties_go_to_the_amplification_the_probability_and_then_to_the_name(table
     near.loc["p200", "expected_amplification"] = 4.0
     near.loc["p300", "probability"] = 0.9
     near.loc["p450", "weighted_velocity"] = np.nan
-    _written({**tables, "near": near}, tmp_path)
+    # as if touching at 3 s and .2 m: 0.5 m/s times .42, below the others but for p450
+    gap = {"gap": np.nan, "probability": np.nan, "weighted_velocity": np.nan}
+    for table in (near, far := tables["Far, far away"].set_index("pair_id", drop=False)):
+        table.loc["p460", [*gap, "period_1", "period_2", "demand"]] = [*gap.values(), 3.0, 3.0, 0.4]
+    _, counts = _written({"near": near, "Far, far away": far}, tmp_path)
+    assert counts == _counts(missing_scenario=2, unknown_gap=1)
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     assert table["pair_id"].tolist()[:5] == ["p100", "p200", "p300", "p000", "p001"]
-    assert table["pair_id"].iloc[-1] == "p450"
+    assert table["pair_id"].tolist()[-2:] == ["p460", "p450"]
     # two thirds of the weight are near's
     assert_allclose(table["weighted_velocity"][0], (2 * 3.0 + 0.5) / 3)
     assert_allclose(table["expected_amplification"][1], (2 * 4.0 + 1.2) / 3)
@@ -113,17 +134,6 @@ def test_every_file_is_written_and_every_column_described(tables, tmp_path):
     assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
 
 
-def test_pairs_that_one_scenario_lacks_are_rejected_by_its_name(tables, tmp_path):
-    tables["near"].loc[11, "probability"] = np.nan
-    _written(tables, tmp_path)
-    # a probability that is missing, or the whole pair
-    rejected = pd.read_csv(tmp_path / "out" / "rejected.csv").set_index("name")["reasons"]
-    assert rejected.index.tolist() == ["p007", "p009", "p011"]
-    assert rejected["p007"].startswith("no probability in near:")
-    assert rejected["p009"].startswith("no probability in Far, far away:")
-    assert rejected["p011"].startswith("no probability in near:")
-
-
 def test_pieces_do_not_change_a_bit(tables, tmp_path, monkeypatch):
     for size in (7, 1000):
         folder = tmp_path / str(size)
@@ -136,16 +146,15 @@ def test_pieces_do_not_change_a_bit(tables, tmp_path, monkeypatch):
         ).read_bytes()
 
 
-def test_a_scenario_without_a_result_leaves_no_pair(tables, tmp_path):
+def test_a_scenario_without_a_result_leaves_no_probability(tables, tmp_path):
     tables["near"].to_parquet(tmp_path / "near.parquet")
     scenarios = Scenarios(
         {"near": [tmp_path / "near.parquet"], "far": []}, {"near": 1.0, "far": 1.0}, yearly=False
     )
-    assert write_ensemble(scenarios, tmp_path, {}, 10)[1] == {
-        "pairs": 0,
-        "rejected_pair": COUNT - 1,
-    }
-    assert len(pd.read_parquet(tmp_path / "ensemble.parquet")) == 0
+    counts = write_ensemble(scenarios, tmp_path, {}, 10)[1]
+    assert counts == _counts(pairs=COUNT - 1, missing_scenario=COUNT - 1)
+    table = pd.read_parquet(tmp_path / "ensemble.parquet")
+    assert table["probability"].isna().all()
     # no scenario has a result
     nothing = Scenarios({"near": [], "far": []}, {"near": 1.0, "far": 1.0}, yearly=False)
-    assert write_ensemble(nothing, tmp_path, {}, 10)[1] == {"pairs": 0, "rejected_pair": 0}
+    assert write_ensemble(nothing, tmp_path, {}, 10)[1] == _counts(pairs=0)

@@ -8,6 +8,8 @@ from scipy.special import ndtr, ndtri
 
 from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.ensemble import (
+    ORDER,
+    SEVERITY,
     annual_probability,
     conditional_probability,
     ensemble_columns,
@@ -59,24 +61,26 @@ def _joined(*rows):
     """Return pairs at one place whose scenarios were joined, from name and probabilities."""
     table = pd.DataFrame(rows, columns=["pair_id", "probability_near", "probability_far"])
     same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
-    # the same severity in both
+    # the same severity in both, as far as a scenario has the pair
     for name in ("near", "far"):
-        severity = {f"expected_impact_velocity_{name}": 0.5, f"weighted_velocity_{name}": 1.0}
-        table = table.assign(**severity, **{f"expected_amplification_{name}": np.nan})
-    table["configuration"] = "floor_to_column"
+        known = table[f"probability_{name}"].notna()
+        for column, value in (("expected_impact_velocity", 0.5), ("weighted_velocity", 1.0)):
+            table[f"{column}_{name}"] = np.where(known, value, np.nan)
+        table[f"demand_{name}"] = np.where(known, 0.1, np.nan)
+        table[f"expected_amplification_{name}"] = np.nan
+    table = table.assign(configuration="floor_to_column", period_1=0.5, period_2=1.0)
     return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
 
 
 def test_every_pair_has_its_probabilities_and_its_worst_scenario():
     joined = _joined(("a", 0.2, 0.4), ("b", 0.9, 0.1), ("c", 0.9, 0.1))
-    joined.loc[2, "expected_impact_velocity_far"] = 0.6
+    joined.loc[2, ["expected_impact_velocity_far", "weighted_velocity_far"]] = 0.6, 1.2
     table = ensemble_rows(joined, WEIGHTS, yearly=False)
     assert_allclose(table["probability"], [0.25, 0.7, 0.7])
     # of equal velocities the likelier scenario; a harder impact outranks it
     assert table["worst_scenario"].tolist() == ["far", "near", "far"]
-    assert list(table) == [
-        name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"
-    ]
+    described = [name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"]
+    assert list(table) == [*described, ORDER]
     assert "annual_probability" not in table
 
 
@@ -115,15 +119,34 @@ def test_a_pair_does_not_depend_on_other_pairs():
         )
 
 
-def test_a_pair_that_a_scenario_lacks_is_rejected_with_its_name():
-    # would catch a missing probability that counts as 0
-    joined = _joined(("a", 0.2, 0.2), ("b", np.nan, np.nan), ("c", 0.1, np.nan))
-    assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
-    rejections = ensemble_rejections(joined, WEIGHTS)
-    reasons = {rejection.name: rejection.reasons[0] for rejection in rejections}
-    assert reasons["b"].startswith("no probability in near, far: ")
-    assert reasons["c"].startswith("no probability in far: ")
-    assert set(reasons) == {"b", "c"}
+NUMBERS = ["probability", "annual_probability", *SEVERITY]
+
+
+def test_a_pair_that_a_scenario_lacks_is_ranked_by_the_others_and_has_no_number():
+    # would catch a missing probability that counts as 0, and a pair that is left out
+    joined = _joined(("a", 0.2, 0.2), ("b", 0.9, np.nan), ("c", np.nan, 0.1))
+    joined["weighted_velocity_near"] *= 3.0
+    table = ensemble_rows(joined, WEIGHTS, yearly=True)
+    assert table["pair_id"].tolist() == ["a", "b", "c"]
+    assert table[NUMBERS].notna().all(axis=1).tolist() == [True, False, False]
+    assert table[NUMBERS].iloc[1:].isna().all(axis=None)
+    # the mean of both, 3/4 times 3 and 1/4 times 1, or the one that is known
+    assert_allclose(table[ORDER], [2.5, 3.0, 1.0])
+    assert table["worst_scenario"].tolist() == ["near", "near", "far"]
+    assert not list(ensemble_rejections(joined))
+
+
+def test_a_pair_of_unknown_gap_stands_where_a_run_puts_it():
+    unknown = _joined(("b", np.nan, np.nan)).assign(gap=np.nan, gap_largest=np.nan)
+    unknown = unknown.assign(demand_near=0.3, demand_far=0.1)
+    joined = pd.concat([_joined(("a", 1.0, 1.0)), unknown], ignore_index=True)
+    table = ensemble_rows(joined, WEIGHTS, yearly=True)
+    assert table[NUMBERS].iloc[1].isna().all()
+    # as a touching pair: half of the demand times the mean of both angular frequencies
+    frequency = 2.0 * np.pi * (1.0 / 0.5 + 1.0 / 1.0) / 2.0
+    assert_allclose(table[ORDER], [1.0, 0.5 * frequency * (0.75 * 0.3 + 0.25 * 0.1)])
+    assert table["worst_scenario"].tolist() == ["near", "near"]
+    assert not list(ensemble_rejections(joined))
 
 
 def test_equal_names_of_different_pairs_are_rejected():
@@ -131,7 +154,7 @@ def test_equal_names_of_different_pairs_are_rejected():
         gap_largest=[0.05, 0.3], latitude_largest=[10.0, 11.0]
     )
     assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
-    (rejected,) = ensemble_rejections(joined, WEIGHTS)
+    (rejected,) = ensemble_rejections(joined)
     assert rejected.reasons == (
         "gap = 0.05 m in one scenario and 0.3 m in another",
         "latitude = 10 degrees in one scenario and 11 degrees in another",

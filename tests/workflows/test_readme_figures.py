@@ -28,7 +28,9 @@ PAIR = {
 
 
 @pytest.fixture
-def script():
+def script(monkeypatch):
+    # It imports another workflow
+    monkeypatch.syspath_prepend(ROOT / "workflows")
     path = ROOT / "workflows" / "readme_figures.py"
     specification = importlib.util.spec_from_file_location("readme_figures", path)
     module = importlib.util.module_from_spec(specification)

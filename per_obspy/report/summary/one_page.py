@@ -94,9 +94,9 @@ def _draw_map(figure: Figure, results: Results, bottom: float) -> None:
     # Marks of many pairs as one picture: each of them as a shape takes longer than all the rest
     for marks in axes.collections if len(results.shown) > MOST_SHAPES else ():
         marks.set_rasterized(True)
-    # Labels in the language of the summary
+    # Labels in the language of the summary, none on the left, where its sentences end
     axes.set_title(results.counted("map_title", len(results.shown)))
-    axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
+    axes.set(xlabel=f"{texts['map_east']}, {texts['map_north']}", ylabel="")
     axes.tick_params(labelsize=7)
     for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
         text.set_fontsize(8)

@@ -49,9 +49,12 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
     assert page.page.eval_on_selector("#alert", "e => getComputedStyle(e).borderLeftColor") == (
         "rgb(127, 0, 0)"
     )
-    status = page.page.inner_text("#status")
-    assert status.startswith("Issued 2026-01-02 04:12 UTC. Automatic, elastic, not reviewed.")
-    assert "severe ≥ 0.5 m/s, high ≥ 0.2 m/s, moderate ≥ 0.05 m/s" in status
+    assert page.page.inner_text("#status") == (
+        "Issued 2026-01-02 04:12 UTC. Automatic, elastic, not reviewed: a later issue or an "
+        "inspection replaces it."
+    )
+    levels = page.page.inner_text("#levels")
+    assert "severe ≥ 0.5 m/s, high ≥ 0.2 m/s, moderate ≥ 0.05 m/s" in levels
     assert page.texts(".shares_legend span") == ["screened: 12"]
     expected = page.page.inner_text("#expected")
     assert expected == (
@@ -541,7 +544,7 @@ def test_spanish(opened):
     # Nothing of the page is left in English but names of data
     english = re.compile(r"\b(the|of|with|and|is|severe|moderate|high|low)\b")
     words = page.page.inner_text("main").replace("made with", "")
-    words += page.page.inner_text("#alert") + page.page.inner_text("#status")
+    words += page.page.inner_text("#alert") + page.page.inner_text("#levels")
     assert english.findall(words) == []
 
 

@@ -97,7 +97,7 @@ def test_the_summary_says_what_where_and_how_sure():
         "SIMULATED. THIS IS NOT AN EARTHQUAKE.",
         "Level: severe. About 5 of 9 screened pairs (56 percent) hit each other; 4 hard enough to "
         "damage floors or columns; 2 of them with floors that meet columns.",
-        "Automatic, elastic, not reviewed.",
+        "Automatic, elastic, not reviewed: a later issue or an inspection replaces it.",
         "3 stations expected; 2 used: XX.A, XX.C; 1 missing or rejected: XX.B.",
         "16 of 20 rows of the pair table are screened; left out: 4 (4 no station within reach).",
         "5 (3 to 9) pairs hit each other (from the sure ones to the possible ones).",

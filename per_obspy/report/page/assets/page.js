@@ -163,7 +163,8 @@ class Page {
     byId("alert").style.borderColor = colour;
     byId("alert").querySelector("strong").textContent = `${level}.`;
     byId("alert").querySelector("span").replaceChildren(...isolated(sentence));
-    byId("status").textContent = [status, levels].join(" ");
+    byId("status").textContent = status;
+    byId("levels").textContent = levels;
   }
 
   // Rows of the file as a bar of shares, and in sentences
