@@ -328,7 +328,13 @@ def _columns_of_rows(
     sizes, first, pair = np.diff(chains.first), chains.first[:-1], chains.pair
     row = np.repeat(np.arange(sizes.size), sizes)
     names = pairs["station"].to_pandas().to_numpy(object)[pair]
-    station, several = serving_stations(row, names, numbers_in(pairs, "distance")[pair])
+    # A row of two has the station of its pair
+    station, several = names[first], np.zeros(first.size, dtype=bool)
+    longer = np.flatnonzero(sizes > 1)
+    of_longer = np.isin(row, longer)
+    station[longer], several[longer] = serving_stations(
+        row[of_longer], names[of_longer], numbers_in(pairs, "distance")[pair][of_longer]
+    )
     flags = chains.flags | {"several_stations": several, "no_record": station == ""}
     of_rows = {
         "row_id": _row_names(contacts, pair, first),
@@ -409,7 +415,7 @@ def chunks_of(file: Path) -> Iterator[pa.Table]:
     A chunk has whole rows of one station, and ``CHUNK`` contacts at most if these are several rows.
     """
     waiting, contacts, last = list[pa.Table](), 0, ""
-    for table in _groups(file):
+    for table in groups_of(file):
         begins, cut = np.flatnonzero(table["interface"].to_numpy() == 1), 0
         sizes = (table["buildings"].to_numpy()[begins] - 1).tolist()
         stations = table["station"].take(pa.array(begins)).to_pylist()
@@ -424,7 +430,7 @@ def chunks_of(file: Path) -> Iterator[pa.Table]:
     yield pa.concat_tables(waiting)
 
 
-def _groups(file: Path) -> Iterator[pa.Table]:
+def groups_of(file: Path) -> Iterator[pa.Table]:
     """Yield the contacts of each group of a file, with the columns of chunks."""
     with pq.ParquetFile(file, pre_buffer=False) as stored:
         names = [name for name in OF_CHUNKS if name in stored.schema_arrow.names]

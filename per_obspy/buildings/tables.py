@@ -16,12 +16,14 @@ import duckdb
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from per_obspy.buildings.columns import BUILDING_FLAGS, BUILDINGS, FLAGS, ROWS
 from per_obspy.buildings.search import (
     AREA,
     GROUP,
+    groups_of,
     one_thread_database,
     stored_rows,
     tables_of,
@@ -82,14 +84,33 @@ def write_rows_part(interfaces: Mapping[str, Any], path: Path) -> None:
         pq.write_table(table, part, row_group_size=GROUP, use_dictionary=texts)
 
 
-def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) -> list[Path]:
+def rows_of_parts(parts: Iterable[Path]) -> Iterator[pa.Table]:
+    """Yield the interfaces of parts of :func:`write_rows_part`."""
+    for part in parts:
+        yield pq.ParquetFile(part.absolute()).read(use_threads=False)
+
+
+def rows_without_histories(contacts: Path) -> Iterator[pa.Table]:
+    """Yield the contacts of a file of :func:`find_rows` as interfaces, without any history."""
+    schema = schema_of(ROWS)
+    for table in groups_of(contacts):
+        columns = list[pa.Array | pa.ChunkedArray]()
+        for field in schema:
+            known = field.name in table.column_names
+            column = table[field.name] if known else pa.nulls(table.num_rows, field.type)
+            if pa.types.is_floating(field.type):
+                column = pc.if_else(pc.is_nan(column), None, column)
+            columns.append(column.cast(field.type))
+        yield pa.table(columns, schema=schema)
+
+
+def write_rows(tables: Iterable[pa.Table], folder: Path, facts: Mapping[str, str]) -> list[Path]:
     """
     Write ``rows.parquet``, which states facts of the whole table, and ``rows.columns.csv``.
 
-    Parts are those of :func:`write_rows_part`, in their order.
+    Tables are those of :func:`rows_of_parts` or :func:`rows_without_histories`.
     """
     files = [folder / "rows.parquet", folder / "rows.columns.csv"]
-    tables = (pq.ParquetFile(part.absolute()).read(use_threads=False) for part in parts)
     schema = _stated_schema(ROWS, facts)
     _write_table(regrouped(tables, schema, GROUP), schema, files[0])
     write_meanings(ROWS, FLAGS, files[1])

@@ -8,7 +8,6 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import binom
 
 from per_obspy.files import written_whole
 from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, MOTION_COLOUR, save
@@ -84,6 +83,9 @@ def draw_reliability(found: Evaluation, path: Path, simulated: bool) -> None:
 
 def _draw_shares(axes: Axes, found: Evaluation) -> None:
     """Draw the observed share of each bin with its 95 % range."""
+    # Few runs have observations, and it takes .2 s to load
+    from scipy.stats import binom
+
     bins = found.reliability
     mean, events = bins["mean_probability"].to_numpy(), bins["events"].to_numpy()
     axes.plot([0.0, 1.0], [0.0, 1.0], color=MOTION_COLOUR, linewidth=0.8, label="as predicted")

@@ -9,7 +9,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from per_obspy.checks import FloatArray
 from per_obspy.report.spectra import add_circle, record_date
 from per_obspy.report.style import (
     BUILDING_COLOURS,
@@ -19,7 +18,7 @@ from per_obspy.report.style import (
     title_name,
 )
 from per_obspy.report.words import length_text, number
-from per_obspy.screening.values import components
+from per_obspy.screening.values import motion_along
 
 #: Why a pair is drawn that need not be the first.
 DIFFERING = "the worst pair with a record whose two circles differ"
@@ -100,14 +99,6 @@ def draw_pair_alone(pair: pd.Series, simulated: bool, path: Path) -> None:
     (part,) = np.array(figure.subfigures(1, 1)).ravel().tolist()
     _draw_two_gaps(part, pair, "")
     save(figure, path, simulated)
-
-
-def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
-    """Return the acceleration along an azimuth (degrees), or that of the only sensor, m/s²."""
-    north, east, _ = components(station)
-    angle = np.radians(azimuth) if station.sizes["horizontal"] == 2 else 0.0
-    along: FloatArray = north * np.cos(angle) + east * np.sin(angle)
-    return along
 
 
 def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:

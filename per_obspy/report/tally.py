@@ -43,9 +43,12 @@ class CellCounts:
         # A class and a state are one kind
         kind = len(self.states) * _codes(placed["risk_class"], self.classes)
         kind += _codes(placed["state"], self.states)
-        # Pairs of one cell and kind together
-        keys, counts = np.unique(np.stack([column, row, kind]), axis=1, return_counts=True)
-        for key, count in zip(keys.T.tolist(), counts.tolist(), strict=True):
+        # Pairs of one cell and kind together: rows of whole tables are compared slowly
+        order = np.lexsort([kind, row, column])
+        keys = np.stack([column, row, kind], axis=1)[order]
+        first = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1))[: order.size])
+        counts = np.diff(first, append=order.size)
+        for key, count in zip(keys[first].tolist(), counts.tolist(), strict=True):
             self._counts[key[0], key[1], key[2]] += count
         while len({key[:2] for key in self._counts}) > MOST_CELLS:
             self._enlarge()

@@ -252,7 +252,9 @@ def part_rows(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
     """Yield the rows of a part with the columns of the whole; the file is closed between reads."""
     for index in range(pq.read_metadata(part.absolute()).num_row_groups):
         with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
-            names = [name for name in schema.names if name in file.schema_arrow.names]
+            # The file makes its schema anew whenever it is asked for
+            known = set(file.schema_arrow.names)
+            names = [name for name in schema.names if name in known]
             table = file.read_row_group(index, columns=names, use_threads=False)
         yield table if table.schema.equals(schema) else _conforming(table, schema)
 

@@ -8,8 +8,12 @@ from typing import NamedTuple
 import pyarrow.parquet as pq
 
 from per_obspy.buildings.search import IDENTIFIERS, AllRows, chunks_of, find_rows
-from per_obspy.buildings.tables import write_buildings, write_rows
-from per_obspy.config import Run
+from per_obspy.buildings.tables import (
+    rows_of_parts,
+    rows_without_histories,
+    write_buildings,
+    write_rows,
+)
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.ranked_table import ranked_table, table_files
@@ -62,11 +66,17 @@ def building_rows(
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
         found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
-        tasks = _tasks(settings, folder, ground, found)
-        parts = _parts(tasks, context.workers, found.contacts)
+        exact, parts = settings.rows.exact, list[Part]()
+        if settings.screening.exact if exact is None else exact:
+            tasks = _tasks(folder, ground, found)
+            parts = _parts(tasks, context.workers, found.contacts)
+            interfaces = rows_of_parts(part.path for part in parts if part.path)
+        else:
+            # Nothing is left to compute
+            interfaces = rows_without_histories(found.file)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
-        outputs = write_rows([part.path for part in parts if part.path], folder, facts)
+        outputs = write_rows(interfaces, folder, facts)
         outputs += write_buildings(folder, found.file, settings, facts)
     rejected = (*found.rejected, *rejections(parts))
     failed = any(part.failed for part in parts)
@@ -84,13 +94,12 @@ def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, in
     }
 
 
-def _tasks(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
+def _tasks(folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
     """Yield one task per chunk of rows."""
-    exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
     for number, table in enumerate(chunks_of(found.file)):
         # Pairs that a map serves have no record
-        station = stations.get(table["station"][0].as_py()) if exact else None
+        station = stations.get(table["station"][0].as_py())
         part = folder / "rows" / f"{number:06}.parquet"
         yield RowsTask(number=number, part=part, contacts=table, station=station)
 

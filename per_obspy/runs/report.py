@@ -43,7 +43,7 @@ from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.run_facts import event_of_run, read_stations, revision_of_run
 from per_obspy.runs.scenario_runs import ScenarioRuns
 from per_obspy.runs.stations import file_stem, simulated_motion
-from per_obspy.runs.tasks.ground_files import read_station_once
+from per_obspy.runs.tasks.ground_files import GroundFiles, read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.runs.worst_pairs import page_drawings, read_drawings, write_drawings
 from per_obspy.screening.columns import HAZARD, known_column
@@ -59,16 +59,19 @@ from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
 
 
-def explained(context: RunContext, stations: Sequence[FinishedStation]) -> Report:
+def explained(
+    context: RunContext, stations: Sequence[FinishedStation], ground: GroundFiles
+) -> Report:
     """Write histories and sensitivity of the worst pairs of a run; none without a risk table."""
-    settings, folder, report = context.settings, context.folder, Report([], [])
+    folder, report = context.folder, Report([], [])
     # A fault leaves the page without them
     if files := table_files(folder):
         with report.tried(folder / WORST_PAIRS):
             with ranked_table(files) as table:
                 names = [name for name in table.schema.names if known_column(name)]
                 worst = table.first(PAGE_PAIRS, names)
-            write_drawings(page_drawings(settings, worst, stations), folder / WORST_PAIRS)
+            drawings = page_drawings(context, worst, stations, ground)
+            write_drawings(drawings, folder / WORST_PAIRS)
     return report
 
 

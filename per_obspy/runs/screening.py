@@ -34,7 +34,6 @@ from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 from per_obspy.runs.tasks.station import FinishedStation, hypocentre_attributes
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.site_motion import Hypocentre, hypocentre_of
-from per_obspy.screening.station_amplitudes import AmplitudeField
 
 #: Chunks per worker, where the inventory is large enough, so that no worker waits for another one.
 CHUNKS_PER_WORKER = 4
@@ -76,10 +75,10 @@ class Screened(NamedTuple):
     pair_tables: PairNotes
     #: Rows of the pair tables, and those that are left out.
     coverage: Coverage
-    #: Motion of stations of which only amplitudes are known.
-    amplitudes: AmplitudeField | None = None
+    #: The ground motion.
+    ground: GroundFiles
     #: Rejections of the stages before.
-    earlier: tuple[Rejection, ...] = ()
+    earlier: tuple[Rejection, ...]
 
     @property
     def left_out(self) -> list[Rejection]:
@@ -89,7 +88,7 @@ class Screened(NamedTuple):
     @property
     def alone(self) -> tuple[StationAmplitudes, ...]:
         """Stations of which only amplitudes are used."""
-        return self.amplitudes.stations if self.amplitudes else ()
+        return self.ground.amplitudes.stations if self.ground.amplitudes else ()
 
 
 def screened(
@@ -137,7 +136,7 @@ def screened(
         rows.failed or _any_failed(parts),
         notes,
         tally.coverage(counts),
-        ground.amplitudes,
+        ground,
         tuple(rejected),
     )
 

@@ -177,7 +177,7 @@ def _later_stages(
         found = screened(context, usable, rejected)
         spectra = _spectra(usable)
         table = write_stations(spectra, found.left_out, found.served.pairs, folder, found.alone)
-        worst = explained(context, usable)
+        worst = explained(context, usable, found.ground)
     # Everything that is read from them
     with timed(record.seconds, "report"):
         report = worst.joined(reported(context, usable, found.coverage))
@@ -214,9 +214,9 @@ def _with_counts(
         "stations_simulated": simulated_stations(usable),
         **found.counts,
     }
-    if found.amplitudes:
-        counts["stations_amplitudes_only"] = len(found.amplitudes.stations)
-        counts["intensities_left_out"] = found.amplitudes.intensities
+    if amplitudes := found.ground.amplitudes:
+        counts["stations_amplitudes_only"] = len(amplitudes.stations)
+        counts["intensities_left_out"] = amplitudes.intensities
     unplaced = {rejection.name for rejection in found.unplaced if rejection.kind == "station"}
     serving = [station.station for station in usable if station.station not in unplaced]
     # Rejections make a result partial

@@ -127,3 +127,11 @@ def components(station: xr.Dataset) -> tuple[FloatArray, FloatArray, float]:
     motion = np.ascontiguousarray(station["acceleration"], dtype=np.float64)
     east = motion[1] if len(motion) == 2 else np.zeros_like(motion[0])
     return motion[0], east, number(station, "sampling_interval")
+
+
+def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
+    """Return the acceleration along an azimuth (degrees), or that of the only sensor, m/s²."""
+    north, east, _ = components(station)
+    angle = np.radians(azimuth) if station.sizes["horizontal"] == 2 else 0.0
+    along: FloatArray = north * np.cos(angle) + east * np.sin(angle)
+    return along

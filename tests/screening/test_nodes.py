@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.stats import lognorm, truncnorm
+from scipy.special import ndtr
+from scipy.stats import lognorm, qmc, truncnorm
 
 from per_obspy.screening.population import (
     NODES,
@@ -24,6 +25,12 @@ PAIRS = {
     "yield_log_std_2": np.array([0.0, 0.0]),
     "period_correlation": np.array([0.0, 0.0]),
 }
+
+
+def test_nodes_are_the_second_sobol_points():
+    # SciPy has the points by another program; eight bits survive both normal functions
+    points = qmc.Sobol(9, scramble=False).fast_forward(128).random(128)
+    assert_array_equal(np.round(256.0 * ndtr(NODES)), 256.0 * points)
 
 
 def test_nodes_are_those_of_independent_standard_normal_variables():
