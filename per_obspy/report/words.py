@@ -56,23 +56,23 @@ def name_text(name: object) -> str:
     return shortened(str(name), LONGEST_NAME)
 
 
-def length_text(metres: float) -> str:
+def length_text(metres: float, language: str = "en") -> str:
     """
     Return a length with two or three digits, in mm, cm or m; in words if it is unknown.
 
     Examples
     --------
-    >>> length_text(0.0), length_text(0.0042), length_text(0.123), length_text(2.5)
-    ('0 cm', '4.2 mm', '12.3 cm', '2.5 m')
+    >>> length_text(0.0), length_text(0.0042), length_text(0.123), length_text(2.5, "es")
+    ('0 cm', '4.2 mm', '12.3 cm', '2,5 m')
     """
     if not math.isfinite(metres):
-        return "unknown"
+        return LANGUAGES[language]["unknown"]
     # Half a unit of the last digit counts as the next one
     text = f"{metres:.3g} m"
     if abs(metres) < 0.9995:
         centimetres = abs(metres) >= 0.00995 or metres == 0.0
         text = f"{100 * metres:.3g} cm" if centimetres else f"{1000 * metres:.2g} mm"
-    return text
+    return text.translate(marks(language))
 
 
 def speed_text(metres_per_second: float, language: str = "en") -> str:
