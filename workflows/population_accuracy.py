@@ -35,6 +35,9 @@ OTHERS = ("kaikoura2016_geonet", "ridgecrest2019_mseed", "itaca2009", "afad2023"
 #: the page is the script's.
 STATIONS, PAIRS, DRAWS, MEASURED = 2, 16, 4096, "## Measured"
 
+#: Columns that draws have too; the others are quantiles of the demand.
+OUTCOMES = COLUMNS[:4]
+
 #: Draws of pairs that can yield: their histories take ten times as long.
 YIELDING_DRAWS = 256
 
@@ -112,7 +115,7 @@ def screened(station: xr.Dataset, number: int) -> pd.DataFrame:
     screened = risk_table(station, pairs)
     # what the estimates alone give, as without a record that supports the pair
     estimated = risk_table(station, pairs, screening=Screening(exact=False)).set_index("pair_id")
-    for name in COLUMNS:
+    for name in OUTCOMES:
         screened[f"estimated_{name}"] = estimated.loc[screened["pair_id"], name].to_numpy()
     return screened
 
@@ -151,7 +154,7 @@ def drawn(station: xr.Dataset, pair: pd.Series, random: np.random.Generator) -> 
         np.quantile(hit.impact_velocity, QUANTILE),
         np.where(touched, amplification, 1.0).mean(),
     )
-    return {f"drawn_{name}": float(value) for name, value in zip(COLUMNS, values, strict=True)}
+    return {f"drawn_{name}": float(value) for name, value in zip(OUTCOMES, values, strict=True)}
 
 
 def compared(events: tuple[str, ...]) -> pd.DataFrame:
@@ -161,7 +164,7 @@ def compared(events: tuple[str, ...]) -> pd.DataFrame:
         for station in stations(event):
             number = len(rows)
             table, random = screened(station, number), np.random.default_rng(number)
-            names = (*COLUMNS, *(f"estimated_{name}" for name in COLUMNS), "kind", "gap", "share")
+            names = (*OUTCOMES, *(f"estimated_{name}" for name in OUTCOMES), "kind", "gap", "share")
             for _, pair in table.iterrows():
                 kept = {name: pair[name] for name in names}
                 alike = abs(np.log(pair["period_1"] / pair["period_2"])) < 0.1
@@ -192,7 +195,7 @@ def lines(table: pd.DataFrame) -> Iterator[str]:
     }
     for name, chosen in groups.items():
         yield f"| {name} | {_cells(table[chosen])} |"
-    estimated = table.assign(**{name: table[f"estimated_{name}"] for name in COLUMNS})
+    estimated = table.assign(**{name: table[f"estimated_{name}"] for name in OUTCOMES})
     yield f"| all, by estimates alone | {_cells(estimated)} |"
     derived = estimated["kind"] == KINDS[2]
     yield f"| periods derived, by estimates alone | {_cells(estimated[derived])} |"
