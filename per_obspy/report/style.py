@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
+from unicodedata import bidirectional
 
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure, SubFigure
@@ -83,14 +84,17 @@ def title_name(name: str) -> str:
 
 def literal(text: str) -> str:
     r"""
-    Escape the dollar signs of a text, so that matplotlib draws no formula.
+    Escape the dollar signs of a text, so that matplotlib draws no formula, and keep its direction.
 
     Examples
     --------
     >>> print(literal("$x_$"))
     \$x_\$
     """
-    return printable(text).replace("$", r"\$")
+    plain = printable(text).replace("$", r"\$")
+    # A name from right to left at the beginning would turn the whole line
+    starts_right = bidirectional(next(filter(str.isalpha, plain), "A")) in ("R", "AL")
+    return f"\u200e{plain}" if starts_right else plain
 
 
 def _fit_titles(figure: Figure) -> None:

@@ -39,6 +39,7 @@ from per_obspy.report.style import BUILDING_COLOURS, UNKNOWN_COLOUR, class_colou
 from per_obspy.report.tally import PairTally
 from per_obspy.report.texts import LANGUAGES, fixed_phrases
 from per_obspy.report.words import missing_gap, prevention_kind
+from per_obspy.results.table_files import rounded_table
 from per_obspy.screening.meanings import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
 
@@ -78,7 +79,7 @@ HIDDEN = (
 BUILDING_KINDS = {
     "rank": "whole", "building_id": "text", "probability_common": "chance",
     "neighbours": "whole", "neighbours_that_can_hit": "whole", "impacts": "whole",
-    "impact_velocity": "number", "position": "choice", "prevention": "choice",
+    "impact_velocity": "number", "position": "choice", "prevention": "names",
 }  # fmt: skip
 
 #: Columns of the tables further down.
@@ -242,6 +243,8 @@ def _further_tables(results: Results, texts: Mapping[str, str]) -> dict[str, Any
     areas, note, language = results.areas, texts["rejected_none"], results.language
     if "expected_pounding" in areas:
         areas = areas.sort_values("expected_pounding", ascending=False)
+    # Impacts have two digits everywhere
+    areas = rounded_table(areas, own=areas.columns)
     if results.rejections:
         shown = results.written(min(results.rejections, MOST_ROWS))
         whole = results.written(results.rejections)

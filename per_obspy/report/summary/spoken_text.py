@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 from textwrap import wrap
-from unicodedata import normalize
+from unicodedata import category, normalize
 
 from per_obspy.files import written_whole
 from per_obspy.report.coverage import coverage_sentences
@@ -26,8 +26,11 @@ from per_obspy.report.texts import LANGUAGES
 #: Longest line, characters.
 WIDTH = 72
 
-#: Characters that are spoken, or a pause; anything else becomes a blank.
-_UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/-]")
+#: ASCII characters that are neither spoken nor a pause, and become a blank.
+_UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/\x80-\U0010ffff-]")
+
+#: Accents that stand by themselves: those of other scripts are parts of their words.
+_ACCENTS = range(0x300, 0x370)
 
 #: Symbols with a word, and the keys of the words.
 _WORDS = {
@@ -38,18 +41,29 @@ _WORDS = {
 
 def spoken(text: str, language: str = "en") -> str:
     """
-    Return a text as plain letters and digits: no accents, symbols as words or blanks.
+    Return a text as letters and digits: no accents, symbols as words or blanks.
+
+    Letters without a plain form stay: a name that lacks some would be another one.
 
     Examples
     --------
-    >>> spoken("Añasco_1 <script>"), spoken("84 %")
-    ('Anasco 1 script', '84 percent')
+    >>> spoken("Añasco_1 <script>"), spoken("84 %"), spoken("Yıldız, חיפה")
+    ('Anasco 1 script', '84 percent', 'Yıldız, חיפה')
     """
     for symbol, key in _WORDS.items():
         text = text.replace(symbol, f" {LANGUAGES[language][key]} ")
-    letters = normalize("NFKD", text).encode("ascii", "ignore").decode()
+    letters = "".join(map(_plain, normalize("NFKC", text)))
     # A word that replaces a symbol stands right before what follows it
     return re.sub(r" (?=[.,:;)])", "", " ".join(_UNSPOKEN.sub(" ", letters).split()))
+
+
+def _plain(letter: str) -> str:
+    """Return a letter without accents, or as it is; a blank for a sign."""
+    if plain := normalize("NFKD", letter).encode("ascii", "ignore").decode():
+        return plain
+    if category(letter)[0] in "LMN":
+        return "" if ord(letter) in _ACCENTS else letter
+    return " "
 
 
 def summary_lines(results: Results) -> list[str]:
@@ -110,4 +124,4 @@ def _numbered(sentences: list[str]) -> list[str]:
 def write_text(results: Results, path: Path) -> None:
     """Write the summary as text, whole or not at all."""
     with written_whole(path) as part:
-        part.write_text("\n".join([*summary_lines(results), ""]), encoding="ascii")
+        part.write_text("\n".join([*summary_lines(results), ""]), encoding="utf-8")
