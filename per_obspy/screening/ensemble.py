@@ -245,7 +245,7 @@ def _mean_of_known(velocity: FloatArray, weight: FloatArray) -> FloatArray:
     """Return the weighted mean over the scenarios that have a pair, the largest without weight."""
     known = np.nan_to_num(velocity)
     total = _weighted_sum((~np.isnan(velocity)).astype(float), weight)
-    mean = known.max(axis=0)
+    mean: FloatArray = known.max(axis=0)
     np.divide(_weighted_sum(known, weight), total, out=mean, where=total > 0.0)
     return mean
 
