@@ -311,11 +311,11 @@ def _order_velocities(rows: pd.DataFrame, weights: Mapping[str, float]) -> Float
 
 
 def _mean_of_known(velocity: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the weighted mean over the scenarios that have a pair; 0 where their weight is 0."""
-    is_known = ~np.isnan(velocity)
-    total = _weighted_sum(is_known.astype(float), weight)
-    mean = np.zeros(total.shape)
-    np.divide(_weighted_sum(np.nan_to_num(velocity), weight), total, out=mean, where=total > 0.0)
+    """Return the weighted mean over the scenarios that have a pair, the largest without weight."""
+    known = np.nan_to_num(velocity)
+    total = _weighted_sum((~np.isnan(velocity)).astype(float), weight)
+    mean: FloatArray = known.max(axis=0)
+    np.divide(_weighted_sum(known, weight), total, out=mean, where=total > 0.0)
     return mean
 
 

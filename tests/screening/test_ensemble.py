@@ -132,6 +132,8 @@ def test_a_pair_that_a_scenario_lacks_is_ranked_by_the_others_and_has_no_number(
     assert table[NUMBERS].iloc[1:].isna().all(axis=None)
     # the mean of both, 3/4 times 3 and 1/4 times 1, or the one that is known
     assert_allclose(table[ORDER], [2.5, 3.0, 1.0])
+    # a scenario without weight is better than nothing
+    assert ensemble_rows(joined, WEIGHTS | {"near": 0.0}, yearly=False)[ORDER][1] == 3.0
     assert table["worst_scenario"].tolist() == ["near", "near", "far"]
     assert not list(ensemble_rejections(joined))
 
