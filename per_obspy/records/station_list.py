@@ -204,8 +204,10 @@ def _features(path: Path) -> list[Any]:
             raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
         # Deep nesting and numbers of endless digits are errors too
         content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise CatalogError(str(path), f"cannot be read as JSON: {reason_of(error)}") from error
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+    except (ValueError, RecursionError) as error:
+        raise CatalogError(str(path), f"a damaged station list: {reason_of(error)}") from error
     features = content.get("features") if isinstance(content, dict) else None
     if not isinstance(features, list):
         raise CatalogError(str(path), "is no list of stations: it has no features")
