@@ -245,10 +245,16 @@ WHOLE = {
         "run run.toml",
         "grid.xml: ",
     ),
+    "a list of stations that ends before the first": (
+        {"list.json": '{"type": "Feat'},
+        "run list.json pairs.csv",
+        "list.json: a damaged station list or layer of outlines: Unterminated string starting at: "
+        "line 1 column 10",
+    ),
     "half a list of stations": (
         {"run.toml": MAPPED.replace("shakemap", "stationlist"), "grid.xml": '{"features": ['},
         "run run.toml",
-        "grid.xml: cannot be read as JSON",
+        "grid.xml: a damaged station list: Expecting value: line 1 column 15",
     ),
     "no such map": (
         {"run.toml": MAPPED},

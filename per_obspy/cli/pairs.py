@@ -358,7 +358,21 @@ def _described(table: "pd.DataFrame") -> "dict[str, Any]":
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
     columns = json.loads(inventory_profile(table).to_json(orient="records"))
-    return {"columns": columns, "derived": derived_counts(table), "unused": unused_columns(table)}
+    unused = unused_columns(table, results_in(table))
+    return {"columns": columns, "derived": derived_counts(table), "unused": unused}
+
+
+def results_in(table: "pd.DataFrame") -> list[str]:
+    """Return the columns of a pair table that a screening has added."""
+    from per_obspy.inventory.schema import COLUMNS
+    from per_obspy.screening.columns import HAZARD, known_column
+    from per_obspy.screening.design import DESIGN
+
+    added = [name for name in map(str, table) if name not in COLUMNS]
+    # Names of places are the user's, too
+    if "state" not in added:
+        return []
+    return [name for name in added if name in {**DESIGN, **HAZARD} or known_column(name)]
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
@@ -397,11 +411,7 @@ def _print_profile(table: "pd.DataFrame") -> None:
     """Print the columns of a pair table: given, derived and unknown ones."""
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
-    profile, derived, unused = (
-        inventory_profile(table),
-        derived_counts(table),
-        unused_columns(table),
-    )
+    profile, derived, results = inventory_profile(table), derived_counts(table), results_in(table)
     # The most frequent of many numbers is meaningless
     frequent = profile["most_frequent"].where(profile["median"].isna(), "")
     described = profile.assign(most_frequent=frequent)
@@ -416,7 +426,9 @@ def _print_profile(table: "pd.DataFrame") -> None:
     if derived:
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
-    _print_unused(unused)
+    if results:
+        print(f"Columns of an earlier screening: {len(results)}")
+    _print_unused(unused_columns(table, results))
 
 
 def _print_unused(unused: list[str]) -> None:

@@ -338,6 +338,7 @@ def _print_counts(record: dict[str, Any]) -> None:
     others = f" and {alone} with amplitudes only" if alone else ""
     stations = f"{counts['stations']} stations{others}"
     print(f"{stations}, {counts['pairs']} pairs: {states}; {rejected} rejected")
+    # What an earlier earthquake left, and people
     if "after_damage_unknown" in counts:
         left, unknown = counts["after_damage_residual"], counts["after_damage_unknown"]
         line = f"{left} pairs start from the gap that the earlier earthquake left"

@@ -208,6 +208,9 @@ def missing_columns(names: Collection[str]) -> list[tuple[str, ...]]:
     return [group for group in (*required, *ONE_OF) if not set(group) & set(names)]
 
 
+#: Columns of a search in outlines: where a height is from, and an outline that is not drawn.
+OF_OUTLINES = tuple(f"{name}_source_{i}" for name in ("height", "outline") for i in (1, 2))
+
 #: Columns that ``completed_pairs`` adds to those above.
 COMPLETED: dict[str, Column] = {
     column.name: column

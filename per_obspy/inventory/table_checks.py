@@ -1,14 +1,15 @@
 """Description of a pair table as a whole: ranges of its columns, derived and unused columns."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import pandas as pd
 
 from per_obspy.config import Building
 from per_obspy.errors import Rejection, did_you_mean
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.footprints.building_columns import PREFIX
+from per_obspy.inventory.schema import COLUMNS, OF_OUTLINES
 from per_obspy.inventory.suspicions import ODD
 
 
@@ -57,11 +58,11 @@ def derived_counts(pairs: pd.DataFrame) -> dict[str, int]:
     return dict(counts)
 
 
-def unused_columns(pairs: pd.DataFrame) -> list[str]:
-    """Return the columns unknown to the schema, each with a similar name of a known one."""
-    return [
-        f"{name}{did_you_mean(str(name), COLUMNS)}" for name in pairs if name not in {*COLUMNS, ODD}
-    ]
+def unused_columns(pairs: pd.DataFrame, known: Collection[str] = ()) -> list[str]:
+    """Return columns that no command writes, each with a similar name of the schema."""
+    # An outline keeps its value under another name where ours is another
+    ours = {*COLUMNS, *(f"{PREFIX}{name}" for name in COLUMNS), *OF_OUTLINES, ODD, *known}
+    return [f"{name}{did_you_mean(str(name), COLUMNS)}" for name in pairs if name not in ours]
 
 
 def faults_by_column(rejected: Iterable[Rejection]) -> dict[str, int]:

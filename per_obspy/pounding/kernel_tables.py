@@ -281,11 +281,16 @@ def run_pairs(
     return rows, run_blocks(kernel, lane_rows, components, dt, rows, *steps)
 
 
-def rest_displacements(rows: FloatArray) -> FloatArray:
-    """Return where structures of rows of pairs come to rest after their motion, (2, n_pairs), m."""
+def of_structures(numbers: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return numbers (n_pairs, 2) of both structures as (2, *shape)."""
+    return numbers.T.reshape(2, *shape)
+
+
+def rest_displacements(rows: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return where structures of rows of pairs come to rest after their motion, (2, *shape), m."""
     # Where the elastic force (1 - hardening) omega² (u - plastic) + hardening omega² u is zero
-    rest: FloatArray = (1.0 - rows[:, :, columns.HARDENING]) * rows[:, :, columns.PLASTIC]
-    return rest.T
+    elastic = 1.0 - rows[:, :, columns.HARDENING]
+    return of_structures(elastic * rows[:, :, columns.PLASTIC], shape)
 
 
 def run_blocks(

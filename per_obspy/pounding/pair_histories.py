@@ -15,6 +15,7 @@ from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.pounding.kernel_tables import (
     closed_record,
     ground_motion,
+    of_structures,
     rest_displacements,
     run_pairs,
 )
@@ -163,10 +164,11 @@ def pounding_histories(
     rows, impacts = run_pairs(
         run_block, LANE_ROWS, components, step, pairs, free_vibration, SLOWEST_COUNTED
     )
+    shape = pairs.shape
     return PoundingMaxima(
-        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
-        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
-        impacts=impacts.reshape(pairs.shape),
-        impact_velocity=rows[:, 0, columns.APPROACH].reshape(pairs.shape),
-        residual=rest_displacements(rows).reshape(2, *pairs.shape),
+        per=of_structures(np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]), shape),
+        displacement_maxima=of_structures(rows[:, :, columns.LARGEST_DISPLACEMENT], shape),
+        impacts=impacts.reshape(shape),
+        impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
+        residual=rest_displacements(rows, shape),
     )

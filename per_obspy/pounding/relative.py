@@ -18,6 +18,7 @@ from per_obspy.pounding.kernel_tables import (
     both_components,
     closed_record,
     ground_motion,
+    of_structures,
     rest_displacements,
     run_pairs,
 )
@@ -436,12 +437,12 @@ def yielding_relative_displacement(
     rows, _ = run_pairs(*kernel, closed_record(record), step, pairs, free_vibration=True)
 
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
-    openings = rows[:, :, columns.OPENING].T.reshape(2, *pairs.shape)
+    openings = of_structures(rows[:, :, columns.OPENING], pairs.shape)
     return YieldingRelativeDisplacement(
         one_before_two=openings[1, ...],
         two_before_one=openings[0, ...],
         largest=openings.max(axis=0),
-        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *pairs.shape),
-        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *pairs.shape),
-        residual=rest_displacements(rows).reshape(2, *pairs.shape),
+        per=of_structures(np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]), pairs.shape),
+        displacement_maxima=of_structures(rows[:, :, columns.LARGEST_DISPLACEMENT], pairs.shape),
+        residual=rest_displacements(rows, pairs.shape),
     )

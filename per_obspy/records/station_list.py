@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, Rejection, reason_of, shortened
 from per_obspy.names import SHOWN, code_problem
@@ -144,39 +145,48 @@ def read_station_list(path: Path) -> StationList:
             stations[name] = _named_station(name, codes, feature, facts, name in stations)
         except ValueError as error:
             rejected.append(Rejection("record", name, str(path), None, (shortened(str(error)),)))
-    found = tuple(stations.values()), tuple(rejected), intensities
-    return StationList(*found, _hypocentre(features))
+    return StationList(
+        tuple(stations.values()), tuple(rejected), intensities, _hypocentre(features)
+    )
+
+
+#: Longitude and latitude, degrees, epicentral and hypocentral distance, km.
+_Distances = tuple[float, float, float, float]
 
 
 def _hypocentre(features: list[Any]) -> tuple[float, float, float] | None:
+    """Return the point from which a list counts its distances; it does not name it otherwise."""
+    rows = np.array([row for row in map(_distances, features) if row]).reshape(-1, 4)
+    epicentral, hypocentral = 1000.0 * rows[:, 2:].T
+    if len(rows) < FEWEST_DISTANCES or (place := _epicentre(rows[:, :2], epicentral)) is None:
+        return None
+    # That of most stations
+    depth = float(np.median(np.sqrt(hypocentral**2 - epicentral**2)))
+    return (*place, depth) if depth <= DEEPEST else None
+
+
+def _epicentre(stations: FloatArray, distances: FloatArray) -> tuple[float, float] | None:
     """
-    Return the point from which a list counts its distances; it does not name it otherwise.
+    Return the place, degrees, at these distances, m, from stations (n, 2); None if there is none.
 
     The cosine of a distance in radii of the Earth is linear in the direction to the epicentre.
     """
-    rows = np.array([row for row in map(_distances, features) if row]).reshape(-1, 4)
-    if len(rows) < FEWEST_DISTANCES:
-        return None
-    east, north = np.radians(rows[:, :2].T)
-    places = np.stack(
-        [np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=1
-    )
-    epicentral, hypocentral = 1000.0 * rows[:, 2:].T
-    x, y, z = direction = np.linalg.lstsq(places, np.cos(epicentral / EARTH_RADIUS))[0]
-    # Distances of one point only, to the metre of their digits
+    east, north = np.radians(stations.T)
+    level = np.cos(north)
+    places = np.stack([level * np.cos(east), level * np.sin(east), np.sin(north)], axis=1)
+    direction = np.linalg.lstsq(places, np.cos(distances / EARTH_RADIUS))[0]
+    # Stations in line leave a point inside of the Earth, those of two earthquakes other distances
     angles = np.arccos(np.clip(places @ direction, -1.0, 1.0))
-    depths = np.sqrt(np.maximum(hypocentral**2 - epicentral**2, 0.0))
-    depth, away = float(np.median(depths)), np.abs(EARTH_RADIUS * angles - epicentral)
-    # Stations in line leave a point that is inside of the Earth
-    is_surface = abs(x * x + y * y + z * z - 1.0) < ON_SURFACE
-    if not (is_surface and away.max() <= SAME_DISTANCE and depth <= DEEPEST):
+    is_inside = abs(direction @ direction - 1.0) > ON_SURFACE
+    if is_inside or np.abs(EARTH_RADIUS * angles - distances).max() > SAME_DISTANCE:
         return None
-    longitude = float(np.degrees(np.arctan2(y, x)))
-    return longitude, float(np.degrees(np.arctan2(z, np.hypot(x, y)))), depth
+    # Degrees east and north
+    x, y, z = direction.tolist()
+    return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
 
 
-def _distances(feature: Any) -> tuple[float, float, float, float] | None:
-    """Return place, degrees, epicentral and hypocentral distance, km, of a feature that has all."""
+def _distances(feature: Any) -> _Distances | None:
+    """Return place and distances of a feature that has all of them."""
     try:
         known = feature["properties"]["distances"]
         row = (*_place(feature), _number(known["repi"]), _number(known["rhypo"]))
@@ -204,8 +214,10 @@ def _features(path: Path) -> list[Any]:
             raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
         # Deep nesting and numbers of endless digits are errors too
         content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise CatalogError(str(path), f"cannot be read as JSON: {reason_of(error)}") from error
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+    except (ValueError, RecursionError) as error:
+        raise CatalogError(str(path), f"a damaged station list: {reason_of(error)}") from error
     features = content.get("features") if isinstance(content, dict) else None
     if not isinstance(features, list):
         raise CatalogError(str(path), "is no list of stations: it has no features")

@@ -47,6 +47,10 @@ class RiskFiles(NamedTuple):
     damage: Counter[str]
 
 
+#: Where no pair could be screened.
+NO_RISK = RiskFiles([], Counter(), Counter(), Counter())
+
+
 def write_risk(
     parts: Sequence[Path],
     folder: Path,

@@ -18,7 +18,7 @@ from per_obspy.records.earthquakes.quakeml import read_event_file
 from per_obspy.records.shakemap import map_event
 from per_obspy.records.station_list import StationAmplitudes
 from per_obspy.results.coverage import Coverage, CoverageTally
-from per_obspy.results.risk import RiskFiles, write_risk
+from per_obspy.results.risk import NO_RISK, RiskFiles, write_risk
 from per_obspy.results.table_files import write_rejected
 from per_obspy.runs.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.runs.losses import areas_left_out, search_of_tables
@@ -116,22 +116,21 @@ def screened(
     # Pairs need a station, amplitudes of one, or a map
     screens = _parts if stations or ground.amplitudes or ground.shakemap else _no_parts
     parts, notes, tally = screens(context, ground)
-    states, served, damage, rows = Counter[str](), Counter[str](), Counter[str](), NO_ROWS
-    outputs = [folder / "rejected.csv"]
+    risk, rows, outputs = NO_RISK, NO_ROWS, [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     if any(part.path for part in parts):
         facts = _facts(settings, stations)
-        files, states, served, damage = _ranked(context, parts, facts)
+        risk = _ranked(context, parts, facts)
         # Rows of buildings are read from it
         rows = building_rows(context, ground, facts)
-        outputs += files + rows.outputs
+        outputs += risk.files + rows.outputs
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
-    counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
-    counts |= {f"after_damage_{word}": damage[word] for word in AFTER_DAMAGE if settings.after}
+    counts = _counts(risk.states, write_rejected(left_out, outputs[0]), parts, rows)
+    counts |= _damage_counts(settings, risk)
     return Screened(
         outputs,
         counts,
-        Served(served, rows.served),
+        Served(risk.stations, rows.served),
         unplaced,
         rows.failed or _any_failed(parts),
         notes,
@@ -165,6 +164,12 @@ def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]
     return {"name": settings.name, "simulated": str(is_simulated).lower()}
 
 
+def _damage_counts(settings: Run, risk: RiskFiles) -> dict[str, int]:
+    """Return the numbers of pairs by what an earlier earthquake did, if it is asked for."""
+    words = AFTER_DAMAGE if settings.after else ()
+    return {f"after_damage_{word}": risk.damage[word] for word in words}
+
+
 def _counts(
     states: Counter[str], kinds: Counter[str], parts: Sequence[Part], rows: BuildingRowsDone
 ) -> dict[str, int]:
@@ -196,6 +201,7 @@ def _described_hypocentre(records: Records) -> Hypocentre | None:
     event = read_event_file(records.event) if records.event else None
     if found := hypocentre_of([hypocentre_attributes(event)]):
         return found
+    # The head of a map
     facts = map_event(records.shakemap) if records.shakemap else {}
     place = [value for name in Hypocentre._fields if isinstance(value := facts.get(name), float)]
     return Hypocentre(*place) if len(place) == len(Hypocentre._fields) else None

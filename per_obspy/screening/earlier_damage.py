@@ -83,29 +83,49 @@ def pairs_after(pairs: pd.DataFrame, earlier: pd.DataFrame, code_level: CodeLeve
       the table says that it is assumed or learned from images.
     * Pairs that the earlier earthquake did not screen are ``unknown``.
     """
-    rows = earlier.set_index("pair_id").reindex(pairs["pair_id"]).reset_index()
-    rows = rows.reindex(columns=[*NEEDED, *MAY_HAVE])
-    is_same = rows["state"].notna().to_numpy() & _same_places(pairs, rows)
+    rows = _matched(pairs, earlier)
+    is_same = rows["state"].notna().to_numpy()
     # The gap in the pair table then, and now
-    assumed = rows["derived"].fillna("").str.split().map(lambda names: "gap" in names)
-    was_given = np.where(assumed, np.nan, numbers_in(rows, "gap"))
-    replaced = numbers_in(rows, "gap_before")
-    before, gap = np.where(np.isnan(replaced), was_given, replaced), numbers_in(pairs, "gap")
-    # A residual gap is as uncertain as what it was computed from, and both residuals
+    before, gap = _surveyed_gap(rows), numbers_in(pairs, "gap")
     residual = numbers_in(rows, "residual_gap")
-    added = np.hypot(_residual_std(rows, 1), _residual_std(rows, 2))
     followed = is_same & np.isfinite(residual) & np.isfinite(before)
-    moved = (np.abs(residual - was_given) > SAME_GAP) | (added > SAME_GAP) | np.isfinite(replaced)
+    # Elastic pairs are as they were
+    std, spread = numbers_in(pairs, "gap_std"), _residual_gap_std(rows)
+    known = spread <= numbers_in(rows, "gap_std") + SAME_GAP
+    moved = ~known | (np.abs(residual - before) > SAME_GAP)
     starts = followed & moved & ~_measured(pairs, gap, before)
-    # What leans on each other touches, whatever the residuals
-    spread = np.hypot(numbers_in(rows, "gap_std"), np.where(residual > 0.0, added, 0.0))
     unknown = ~is_same | _may_be_damaged(rows, followed, code_level)
     return pairs.assign(
         gap=np.where(starts, np.minimum(residual, WIDEST), gap),
-        gap_std=np.where(starts, np.minimum(spread, LARGEST_STD), numbers_in(pairs, "gap_std")),
+        gap_std=np.where(starts, spread, std),
         gap_before=np.where(starts, before, np.nan),
         after_damage=np.where(unknown, UNKNOWN, np.where(starts, RESIDUAL, "")),
     )
+
+
+def _matched(pairs: pd.DataFrame, earlier: pd.DataFrame) -> pd.DataFrame:
+    """Return the earlier row of each pair, empty where there is none or it stands elsewhere."""
+    rows = earlier.set_index("pair_id").reindex(pairs["pair_id"]).reset_index()
+    rows = rows.reindex(columns=[*NEEDED, *MAY_HAVE])
+    return rows[_same_places(pairs, rows)].reindex(rows.index)
+
+
+def _residual_gap_std(rows: pd.DataFrame) -> FloatArray:
+    """Return the deviation of residual gaps, m: that of the gap, and of both residuals."""
+    added = np.hypot(_residual_std(rows, 1), _residual_std(rows, 2))
+    # What leans on each other touches, whatever the residuals
+    is_open = numbers_in(rows, "residual_gap") > 0.0
+    spread = np.hypot(numbers_in(rows, "gap_std"), np.where(is_open, added, 0.0))
+    return np.asarray(np.minimum(spread, LARGEST_STD))
+
+
+def _surveyed_gap(rows: pd.DataFrame) -> FloatArray:
+    """Return the gap in the pair table of the earlier run, m; NaN where it had none."""
+    assumed = rows["derived"].fillna("").str.split().map(lambda names: "gap" in names)
+    given = np.where(assumed, np.nan, numbers_in(rows, "gap"))
+    # That before a still earlier one
+    before = numbers_in(rows, "gap_before")
+    return np.where(np.isnan(before), given, before)
 
 
 def _same_places(pairs: pd.DataFrame, rows: pd.DataFrame) -> BoolArray:

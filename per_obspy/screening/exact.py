@@ -151,6 +151,7 @@ def _pounding_columns(
         # impacts amplify the radius that the same oscillator has without contact
         before, ratio = radii[:, meets], np.ones_like(history.per)
         amplification[:, meets] = np.divide(history.per, before, out=ratio, where=before > 0)
+    # In the order of their names
     columns = impacts, velocity, *amplification
     return dict(zip(EXACT_COLUMNS[2:6], columns, strict=True))
 
@@ -224,6 +225,7 @@ def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) 
     both buildings; their displacements at rest afterwards. Linear pairs take the shorter
     computation, and their PER from the table.
     """
+    # Linear buildings rest where they were
     free = np.zeros((6, azimuth.size))
     free[2:4] = at_contact(table, "per")
     yields = can_yield(table)

@@ -46,6 +46,7 @@ def earlier_earthquakes(
         )
         apart = great_circle(state.longitude, state.latitude, event.longitude, event.latitude)
         later = moment(event.time) - moment(state.time)
+        # Not one that was deleted
         if state.state != "closed" and timedelta() < later <= time and float(apart) <= reach:
             found.append(state)
     return sorted(found, key=lambda state: moment(state.time), reverse=True)

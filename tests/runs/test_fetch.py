@@ -134,8 +134,9 @@ def test_a_wrong_setting_is_named(tmp_path):
 
 
 def test_records_that_no_service_has_come_from_a_seedlink_server(server, tmp_path):
-    server.fail("dataselect", "S001", status(204))
-    server.fail("dataselect", "S002", status(204))
+    # networks of low-cost stations have no such service
+    server.fail("dataselect", "S001", status(404))
+    server.fail("dataselect", "S002", status(404))
     live = server.stream.select(station="S001")
     with seedlink(live) as real_time:
         settings = {"event_provider": server.url, "providers": [server.url], "wait": 0.01}
@@ -144,7 +145,8 @@ def test_records_that_no_service_has_come_from_a_seedlink_server(server, tmp_pat
     (row,) = found.rejected
     assert row.name == "XX.S002"
     assert row.reasons == (
-        f"{server.url[7:]} has no data of the window",
+        f"{server.url}/fdsnws/dataselect/1/query: not found (HTTP 404): it lists stations, but "
+        "their records are perhaps on SeedLink only (records.fdsn.seedlink)",
         f"{real_time.address} has no data of the window",
     )
     stream = read(str(found.folder / "XX.S001.mseed")).merge()

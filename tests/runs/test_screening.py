@@ -10,7 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy import read_pairs, risk_table
+from per_obspy.cli.pairs import results_in
 from per_obspy.errors import CatalogError
+from per_obspy.inventory.table_checks import unused_columns
 from per_obspy.runs.run import report, run, screen
 from per_obspy.runs.screening import SMALLEST_CHUNK, _chunk_rows
 from per_obspy.runs.shown_pair import find_pair
@@ -517,3 +519,11 @@ def test_a_run_starts_from_finished_results_of_another(copied, after, problem):
     configuration.write_text(f'after = "{after}"\n{configuration.read_text()}')
     with pytest.raises(CatalogError, match=f"{after}: after: .*{problem}"):
         screen(configuration, executor=InProcess())
+
+
+def test_a_check_of_pairs_knows_every_column_of_a_result(finished):
+    table = read_pairs(finished[0] / "out" / "risk.parquet")
+    assert {"state", "demand_exact"} <= set(results_in(table))
+    assert unused_columns(table, results_in(table)) == []
+    # without a result a column of that name is the user's
+    assert results_in(table.drop(columns="state")) == []

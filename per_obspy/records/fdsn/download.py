@@ -30,6 +30,7 @@ from per_obspy.records.fdsn.request import (
 )
 from per_obspy.records.fdsn.web import (
     EmptyAnswer,
+    NotFound,
     RequestTooLarge,
     WebPool,
     answer,
@@ -234,9 +235,15 @@ def _records(
         return _all_asked(content, f"seedlink://{server}", files, str(server))
     url = f"{offer.base}/fdsnws/dataselect/1/query"
     records, fault = Records(), ServiceError()
-    with suppress(RequestTooLarge):
+    try:
         content = steady_answer(pool, url, files.parameters)
         records = _all_asked(content, url, files, host(url))
+    except NotFound as error:
+        # As of networks that send their records in real time only
+        problem = f"{error}: it lists stations, but their records are perhaps on SeedLink only"
+        raise NotFound(f"{problem} (records.fdsn.seedlink)") from error
+    except RequestTooLarge:
+        pass
     # A cut at a MiniSEED record loses whole channels: those that are missing are asked for alone
     for codes in offer.channels:
         if codes not in records.channels:

@@ -17,6 +17,7 @@ from per_obspy.runs.inputs.input_kinds import (
     files_in,
     kind_of,
     records_place,
+    require_whole_json,
 )
 
 log = logging.getLogger(__name__)
@@ -170,6 +171,8 @@ def _require_both(
     records, pairs = found
     example = "per-obspy run RECORDS PAIRS"
     # The same twice, or one alone
+    for argument in given if len(pairs) > 1 else ():
+        require_whole_json(Path(argument))
     if len(records) > 1 or len(pairs) > 1:
         missing = "records" if pairs else "a pair table or footprints of buildings"
         raise CatalogError(" and ".join(given), f"neither is {missing}: {example}")

@@ -1,6 +1,7 @@
 """The kind of a file or folder, by its content rather than its name or its place in a command."""
 
 import gzip
+import json
 import re
 import tomllib
 import zipfile
@@ -173,9 +174,19 @@ def _file_kind(path: Path) -> Kind:
         return _zip_kind(path)
     if head.startswith(b"\x1f\x8b") and path.name.lower().endswith(".xml.gz"):
         head = _unpacked_head(path)
+    head = _as_utf8(head)
     kinds = [kind for start, kind in _MAGIC.items() if head.startswith(start)]
     kinds += [kind for word, kind in _WORDS.items() if word in head]
-    return kinds[0] if kinds else _toml_kind(path, head) or _text_kind(path, head)
+    kind = kinds[0] if kinds else _toml_kind(path, head) or _text_kind(path, head)
+    # A list that is empty, or cut before its first station, is known by its name alone
+    is_named = "stationlist" in path.name.lower() and _is_json(path)
+    return Kind.STATION_LIST if is_named and kind in (Kind.FOOTPRINTS, Kind.RECORDS) else kind
+
+
+def _as_utf8(head: bytes) -> bytes:
+    """Return the beginning of JSON in UTF-8, whichever encoding it has; other bytes as they are."""
+    text = head.decode(json.detect_encoding(head), "replace").lstrip("\ufeff \t\r\n")
+    return text.encode("utf-8", "replace") if text.startswith("{") else head
 
 
 def _unpacked_head(path: Path) -> bytes:
@@ -272,6 +283,17 @@ def _is_station_table(head: bytes) -> bool:
 def _is_json(path: Path) -> bool:
     """Return whether the name of a file ends in ``json``, as that of a layer of buildings may."""
     return path.suffix.lower() in (".json", ".geojson")
+
+
+def require_whole_json(path: Path) -> None:
+    """Raise ``CatalogError`` for JSON that ends too early to show what it is, with the position."""
+    if not (path.is_file() and _is_json(path) and path.stat().st_size <= HEAD):
+        return
+    try:
+        json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        reason = f"a damaged station list or layer of outlines: {reason_of(error)}"
+        raise CatalogError(str(path), reason) from error
 
 
 def _table_kind(names: Sequence[str]) -> Kind | None:

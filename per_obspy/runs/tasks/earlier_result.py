@@ -52,6 +52,7 @@ def check_earlier(settings: Run, folder: Path) -> None:
     files = table_files(after)
     if not is_finished or not files:
         raise CatalogError(str(after), "after: no finished run with a risk table here")
+    # Results of other versions, and of a design spectrum
     names = dataset(files).schema.names
     if missing := [name for name in NEEDED if name not in names]:
         reason = f"after: has no column {missing[0]}: do this run again with this version"

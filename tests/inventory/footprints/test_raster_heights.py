@@ -185,4 +185,6 @@ def test_the_command_says_what_the_raster_gave(call, write, tmp_path):
     assert sorted([*pairs["height_1"], *pairs["height_2"]]) == pytest.approx([5.0, 8.0, 8.0, 8.0])
     assert all("height_2" in names.split() for names in pairs["derived"])
     assert (pairs["period_log_std_2"] > pairs["period_log_std_1"].min()).all()
+    # a check knows every column
+    assert json.loads(call("pairs", "check", tmp_path / "pairs.csv", "--json")[1])["unused"] == []
     assert heights_are_from_raster(pairs).tolist() == [True, True]

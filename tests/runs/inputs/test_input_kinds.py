@@ -38,6 +38,8 @@ TEXTS = {
     ('{"type": "FeatureCollection", "features": [{"commType": "UNK"}]}', ".json"): (
         Kind.STATION_LIST
     ),
+    ('{"type": "FeatureColl', "_stationlist.json"): Kind.STATION_LIST,
+    ("", "_stationlist.json"): Kind.STATION_LIST,
     ('<?xml version="1.0"?><FDSNStationXML>', ".xml"): Kind.STATIONS,
     ('<?xml version="1.0"?><q:quakeml>', ".xml"): Kind.EVENT,
     ('<?xml version="1.0"?><shakemap_grid>', ".xml"): Kind.SHAKEMAP,
