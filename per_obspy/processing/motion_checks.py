@@ -14,13 +14,12 @@ from itertools import permutations
 import numpy as np
 from obspy import Stream, Trace
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
 from per_obspy.processing.account import Finding, Findings
 from per_obspy.processing.components import align, is_horizontal
-from per_obspy.processing.series import is_long, running_rms, without_line
+from per_obspy.processing.series import integral, is_long, running_rms, without_line
 
 #: Fewest samples of a record whose components are compared.
 FEWEST = 500
@@ -214,13 +213,13 @@ def final_findings(trace: Trace, checks: Checks) -> Findings:
     a residual velocity before the filter is a finding too.
     """
     findings, dt = Findings(checks), trace.stats.delta
-    velocity = cumulative_trapezoid(trace.data, dx=dt, initial=0)
+    velocity = integral(trace.data, dt)
     peak = float(np.abs(velocity).max())
     findings.compare("impossible_velocity", peak)
     # A sampling interval that is too long enlarges the velocity, not the acceleration
     findings.compare("velocity_time", _ratio(peak, float(np.abs(trace.data).max())))
     findings.compare("final_velocity", _ratio(float(abs(velocity[-1])), peak))
-    displacement = cumulative_trapezoid(velocity, dx=dt, initial=0)
+    displacement = integral(velocity, dt)
     farthest = float(np.abs(displacement).max())
     findings.compare("final_displacement", _ratio(float(abs(displacement[-1])), farthest))
     _find_shift(trace.stats.get("per_obspy", {}), peak, findings)

@@ -183,7 +183,8 @@ def _longest(values: NDArray[np.bool_]) -> int:
 
 def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
     """Return the samples between 5 and 95 % of the squared motion."""
-    energy = np.cumsum((samples - samples.mean()) ** 2)
+    energy = samples - samples.mean()
+    np.cumsum(np.square(energy, out=energy), out=energy)
     first, last = (1 - SIGNIFICANT) * energy[-1], SIGNIFICANT * energy[-1]
     return np.asarray((energy >= first) & (energy <= last))
 
@@ -253,16 +254,17 @@ def overflow_roughness(samples: FloatArray) -> float:
     two such steps.
     """
     middle, full = np.median(samples), np.ptp(samples)
-    steps = np.flatnonzero(np.abs(np.diff(samples)) > OVERFLOW_STEP * full)
+    changes = np.diff(samples)
+    steps = np.flatnonzero(np.abs(changes) > OVERFLOW_STEP * full)
     # Both ends of an overflow are near opposite extremes, those of a spike are not
     ends = np.minimum(np.abs(samples[steps] - middle), np.abs(samples[steps + 1] - middle))
     if steps.size < 2 or np.median(ends) < OVERFLOW_END * full:
         return np.inf
     # Jumps around the steps as they are, and turned back
     around = np.unique(np.clip(steps[:, None] + np.arange(-2, 4), 1, samples.size - 2))
-    turned = np.unwrap(samples, period=full)
-    before, after = (np.square(_jumps(motion)[around]).mean() for motion in (samples, turned))
-    return float(np.sqrt(after / before))
+    sides = np.stack([changes[around - 1], changes[around]])
+    turned = sides - full * np.round(sides / full)
+    return float(np.linalg.norm(np.diff(turned, axis=0)) / np.linalg.norm(np.diff(sides, axis=0)))
 
 
 def longest_gaps(samples: FloatArray, dt: float) -> tuple[float, int]:
@@ -276,6 +278,7 @@ def longest_gaps(samples: FloatArray, dt: float) -> tuple[float, int]:
     """
     envelope = running_rms(samples - np.median(samples), STANDSTILL_ENVELOPE, dt, "reflect")
     is_moving = envelope > MOVING * envelope.max()
+    del envelope
     # Equal samples
     starts, stops = runs(np.diff(samples) == 0)
     still = (stops - starts)[is_moving[starts] & is_moving[stops]].max(initial=0)

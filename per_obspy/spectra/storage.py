@@ -29,31 +29,35 @@ FEWEST_COMPRESSED = 1000
 
 def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     """Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all."""
-    # Coordinates of CF that are no axes: each variable names those that it has
-    places = sorted(str(name) for name in dataset.coords if name not in dataset.dims)
     with written_whole(path) as part, netCDF4.Dataset(part, "w") as file:
         file.setncatts(dataset.attrs)
         for name in [*dataset.data_vars, *dataset.coords]:
-            variable = dataset.variables[name]
-            for axis in variable.dims:
-                if axis not in file.dimensions:
-                    file.createDimension(axis, dataset.sizes[axis])
-            is_text, is_coordinate = variable.dtype.kind not in "fi", name in dataset.coords
-            stored = file.createVariable(
-                name,
-                str if is_text else variable.dtype,
-                variable.dims,
-                fill_value=np.nan if variable.dtype.kind == "f" and not is_coordinate else None,
-                # Processed samples take as much space compressed, and twice the time
-                zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
-            )
-            stored.setncatts(variable.attrs)
-            own = [
-                place for place in places if {*dataset.variables[place].dims} <= {*variable.dims}
-            ]
-            if own and not is_coordinate:
-                stored.coordinates = " ".join(own)
-            stored[...] = variable.values.astype(object) if is_text else variable.values
+            _write_variable(file, dataset, str(name))
+
+
+def _write_variable(file: netCDF4.Dataset, dataset: xr.Dataset, name: str) -> None:
+    """Write a variable with its axes and attributes."""
+    variable, is_data = dataset.variables[name], name in dataset.data_vars
+    axes = [str(axis) for axis in variable.dims]
+    for axis in axes:
+        if axis not in file.dimensions:
+            file.createDimension(axis, dataset.sizes[axis])
+    is_text = variable.dtype.kind not in "fi"
+    stored = file.createVariable(
+        name,
+        str if is_text else variable.dtype,
+        axes,
+        fill_value=np.nan if variable.dtype.kind == "f" and is_data else None,
+        # Processed samples take as much space compressed, and twice the time
+        zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
+    )
+    stored.setncatts(variable.attrs)
+    # As CF asks for: coordinates that are no axes are named by each variable that has them
+    places = sorted(str(place) for place in dataset.coords if place not in dataset.dims)
+    own = [place for place in places if {*dataset.variables[place].dims} <= {*axes}]
+    if own and is_data:
+        stored.coordinates = " ".join(own)
+    stored[...] = variable.values.astype(object) if is_text else variable.values
 
 
 def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
@@ -72,8 +76,7 @@ def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
                 attributes = dict(stored.__dict__)
                 attributes.pop("_FillValue", None)
                 places |= {*attributes.pop("coordinates", "").split()}
-                values = stored[...]
-                values = np.asarray(values, dtype=str) if stored.dtype is str else values
+                values = np.asarray(stored[...], dtype=str if stored.dtype is str else None)
                 variables[name] = (stored.dimensions, values, attributes)
             attributes = dict(file.__dict__)
     # Damaged parts are errors of the netCDF library

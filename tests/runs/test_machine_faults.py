@@ -49,7 +49,7 @@ def no_memory(*_, **__):
 #: What fails, and how: at a record, a station file, a chunk, and when a chunk reads a station file.
 FAULTS = {
     "record not opened": (archive, "_archive_of", system_error(errno.EMFILE)),
-    "shard not read back": (station, "_read_shard", system_error(errno.EIO)),
+    "shard not read back": (station, "file_hash", system_error(errno.EIO)),
     "part not written": (chunk, "write_part", system_error(errno.EIO)),
     "memory for pairs": (chunk, "risk_rows", no_memory),
     "shard vanished": (ground_files, "read_spectra", system_error(errno.ENOENT)),

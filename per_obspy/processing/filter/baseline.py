@@ -14,13 +14,12 @@ from types import FrameType
 import numpy as np
 from numpy.polynomial import Polynomial
 from obspy import Trace
-from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from per_obspy.checks import FloatArray, number, positive, record
 from per_obspy.processing.account import with_note
 from per_obspy.processing.noise_window import picked_onset
-from per_obspy.processing.series import significant_samples
+from per_obspy.processing.series import integral, significant_samples
 
 #: Latest start of the quiet end, fraction of the record.
 LATEST_START = 0.9
@@ -174,7 +173,7 @@ def velocity_residual(
             "onset and end must be times within the first 90 % of the record, "
             f"got {onset:g} and {end:g} s"
         )
-    velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
+    velocity = integral(samples, dt)
     is_outside = (time < onset) | (time >= end)
 
     def mean_square(baseline: FloatArray) -> float:
@@ -234,8 +233,8 @@ def displacement_polynomial(
     samples, dt, time = _record(data, dt, inspect.currentframe())
     if order < 2:
         raise ValueError(f"order must be at least 2, got {order}")
-    velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
-    displacement = cumulative_trapezoid(velocity, dx=dt, initial=0)
+    velocity = integral(samples, dt)
+    displacement = integral(velocity, dt)
     # Least squares in powers of time over the duration
     duration = time[-1]
     powers = np.arange(2, order + 1)
@@ -289,7 +288,7 @@ def final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[flo
     The samples are acceleration, m/s2; at least two follow the start.
     """
     after = slice(int(np.searchsorted(time, start)), None)
-    velocity = cumulative_trapezoid(samples, time, initial=0)[after]
+    velocity = integral(samples, time[1] - time[0])[after]
     # Least squares about the means, which are as accurate as orthogonal polynomials
     middle, mean = time[after].mean(), velocity.mean()
     times = time[after] - middle

@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft
-from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Processing
 from per_obspy.processing.filter.baseline import final_line, residual_velocity, sample_times
 from per_obspy.processing.filter.butterworth import butterworth_amplitude, thin_spectrum
-from per_obspy.processing.series import without_line
+from per_obspy.processing.series import integral, without_line
 from per_obspy.spectra.elastic import per_spectrum
 
 #: Periods at which PER is compared, s.
@@ -102,7 +101,7 @@ def longest_certain_period(
     time, interval = sample_times(plain, dt), dt * _thinning(dt)
     # Is the velocity that stays large for the record as it is used?
     (used,) = _filtered(corrected[np.newaxis], dt, highpass, settings.order)
-    peak = np.abs(cumulative_trapezoid(used, dx=interval)).max()
+    peak = np.abs(integral(used, interval)).max()
     if _velocity_left(plain, time, shaking) <= SUSPECTED * peak:
         return np.inf
     # Shifts that fit the final velocity
@@ -195,8 +194,7 @@ def _weights(
     plain: FloatArray, time: FloatArray, times: FloatArray, shifts: FloatArray
 ) -> FloatArray:
     """Return the weight of each correction, from the displacement that it leaves in the shaking."""
-    velocity = cumulative_trapezoid(plain, time, initial=0)
-    displacement = cumulative_trapezoid(velocity, time, initial=0)
+    displacement = integral(integral(plain, time[1]), time[1])
     # Displacement of a step of 1 m/s2 at each time
     during = (time >= times[0]) & (time <= times[-1])
     parabolas = np.maximum(time[during] - times[:, np.newaxis], 0.0) ** 2 / 2
