@@ -56,8 +56,8 @@ LOG_IMPULSE, LOG_DISPLACEMENT_1, LOG_DISPLACEMENT_2 = 6, 7, 8
 LOG_COLUMNS = 9
 #: An impact counts if its approach speed is above this (m/s) and above this share of the fastest.
 SLOWEST_COUNTED, COUNTED_SHARE = 1e-3, 1e-2
-#: Impacts of a row in lanes at most; touching ones whose masses differ by a factor of a million have
-#: more.
+#: Impacts of a row in lanes at most; touching rows whose masses differ by a factor of a million
+#: have more.
 MOST_IMPACTS = 1 << 22
 #: Clearance below which two structures touch at the instant of another contact, relative to
 #: displacements and gap.
