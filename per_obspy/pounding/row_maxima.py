@@ -8,7 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
+from per_obspy.kernels.pounding_events.contact import (
+    MOST_IMPACTS,
+    SLOWEST_COUNTED,
+    drop_uncounted,
+)
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import (
     LANE_ROWS,
@@ -19,7 +23,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.run_block import run_block, run_lanes
 from per_obspy.kernels.pounding_lanes.step_by_step import STATE_COLUMNS
-from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
+from per_obspy.kernels.pounding_rows.row_by_events import run_row_by_events
 from per_obspy.kernels.pounding_rows.window_lanes import WINDOW_SIZE
 from per_obspy.pounding.kernel_tables import (
     SHORTEST_BOUNCE,
@@ -52,11 +56,7 @@ from per_obspy.threads import map_in_threads
 IntArray = NDArray[np.int64]
 
 #: Impacts of a row that may count for which there is room at first, and factor of more room.
-FIRST_ROOM, MORE_ROOM = 1 << 14, 16
-
-#: Impacts of a row that may count at most: their log takes 300 MB. Touching rows whose masses
-#: differ by a factor of a million have more.
-MOST_IMPACTS = 1 << 22
+FIRST_ROOM, MORE_ROOM = 1 << 12, 16
 
 #: Rows of which a block keeps the logs: as many rows of three buildings as it has.
 MOST_ROWS = PAIR_LANES // 3
@@ -93,16 +93,15 @@ def run_row_blocks(
     parts: IntArray,
     free_steps: IntArray,
     azimuth: FloatArray,
-    scale: FloatArray,
 ) -> IntArray:
     """
     Carry all rows through a record and the free vibration after it, on all processors.
 
     The ground (2, n_samples) is in m/s², dt in s; ``lines`` (n_buildings, ROW_COLUMNS) are at rest,
     then at the end, those of a row from its ``first`` on. Each row has its steps of a sampling
-    interval, sampling intervals of free vibration at most, and azimuth (rad); ``scale`` is that of
-    the clearance after each building (`row_scales`). Return impacts that count after each building
-    (`count_row_impacts`); ``RuntimeError`` if a step has more events than any record causes.
+    interval, sampling intervals of free vibration at most, and azimuth (rad). Return impacts that
+    count after each building (`drop_uncounted`); ``RuntimeError`` if a step has more events than
+    any record causes.
     """
     # Rows of two are pairs, of which a block has more
     counts, sizes = _run_pairs(ground, dt, first, lines, parts, free_steps, azimuth), np.diff(first)
@@ -113,8 +112,8 @@ def run_row_blocks(
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         # Blocks do not depend on each other
         record, others = records[int(parts[block[0]])], (azimuth[block], free_steps[block])
-        counted = _counted_block(record, lines[members], sizes[block], others, scale[members], kept)
-        lines[members], counts[members] = counted
+        lines[members] = _counted_block(record, lines[members], sizes[block], others, kept)
+        counts[members] = lines[members, columns.IMPACTS]
 
     map_in_threads(run, packed_rows(first, parts, np.flatnonzero(sizes != 2)))
     return counts
@@ -142,18 +141,16 @@ def _counted_block(
     start: FloatArray,
     sizes: IntArray,
     others: tuple[FloatArray, IntArray],
-    scale: FloatArray,
     kept: KeptLogs,
-) -> tuple[FloatArray, IntArray]:
-    """Return the buildings of one block at the end, and impacts that count."""
+) -> FloatArray:
+    """Return the buildings of one block at the end, with impacts that count."""
     firsts = np.append(0, np.cumsum(sizes))
     own, logs = run_logged_block(record, start, firsts, *others, kept)
     # Row by row
-    counts = []
     for begin, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
-        counts.append(count_row_impacts(own[begin:end], log, scale[begin:end]))
+        drop_uncounted(own[begin:end], log)
     kept.keep(logs)
-    return own, np.concatenate(counts)
+    return own
 
 
 def run_logged_block(
@@ -178,13 +175,13 @@ def run_logged_block(
         """Run the block from rest; the kernels change the lines and the steps of free vibration."""
         own[:] = start
         is_through = run(record, own, logs, firsts, direction, free.copy())
-        impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
+        if own[firsts[:-1], columns.ALL_IMPACTS].max() > MOST_IMPACTS:
+            raise RuntimeError(f"a row has more than {MOST_IMPACTS} impacts")
         # A run ends where a log is full
+        impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
         room: int = logs.shape[1]
-        if impacts > room >= MOST_IMPACTS:
-            raise RuntimeError(f"a row has more than {MOST_IMPACTS} impacts that may count")
         if impacts > room:
-            return min(MORE_ROOM * room, MOST_IMPACTS)
+            return MORE_ROOM * room
         if not is_through:
             raise RuntimeError("no end of events in a step of a row")
         return impacts
@@ -413,7 +410,7 @@ def _run_part(
 ) -> FloatArray:
     scales = row_scales(rows)
     lines = _lines_at_rest(rows, scales)
-    counts = _run_lines(ground, dt, rows, scales, lines, free_vibration)
+    counts = _run_lines(ground, dt, rows, lines, free_vibration)
 
     # The lines hold squares of the largest radii
     displacement = lines[:, columns.LARGEST_DISPLACEMENT] / scales.displacement
@@ -426,7 +423,6 @@ def _run_lines(
     ground: FloatArray,
     dt: float,
     rows: BuildingRows,
-    scales: RowScales,
     lines: FloatArray,
     free_vibration: bool,
 ) -> IntArray:
@@ -444,7 +440,7 @@ def _run_lines(
     lines[starts, columns.STICKING_SPEED] = velocity * drive
     lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
     lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, np.diff(rows.first) - 1)
-    return run_row_blocks(ground, dt, rows.first, lines, *steps, scales.clearance)
+    return run_row_blocks(ground, dt, rows.first, lines, *steps)
 
 
 def _lines_at_rest(rows: BuildingRows, scales: RowScales) -> FloatArray:

@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from per_obspy import threads
-from per_obspy.pounding import row_maxima as rows_page
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.row_history import pounding_history
 from per_obspy.pounding.row_maxima import BuildingRows, row_maxima
@@ -111,14 +110,6 @@ class TestSingleHistories:
         maxima = row_maxima(NORTH, EAST, DT, rows)
         expected = np.concatenate([history.per for history in histories(rows)])
         assert_allclose(maxima.radius, expected, rtol=1e-6)  # required of maxima
-
-    def test_rows_with_too_many_impacts_are_refused(self, monkeypatch):
-        # catches: logs that take the memory of the machine
-        monkeypatch.setattr(rows_page, "FIRST_ROOM", 4)
-        monkeypatch.setattr(rows_page, "MOST_IMPACTS", 8)
-        rows = plain(random_rows([5], gap=(0.0, 0.0), seed=3))
-        with pytest.raises(RuntimeError, match="more than 8 impacts that may count"):
-            row_maxima(NORTH, EAST, DT, rows)
 
     @pytest.mark.parametrize("gap", [0.0, 0.02])
     def test_yielding_rows(self, gap):

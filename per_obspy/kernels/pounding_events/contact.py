@@ -14,10 +14,12 @@ import numpy as np
 
 from per_obspy.kernels._jit import kernel, lean
 from per_obspy.kernels.pounding_events.motion import (
+    ALL_IMPACTS,
     APPROACH,
     BOUNCE_LIMIT,
     BOUNCES,
     CLEARANCE_ORDER,
+    COUNTED_SPEED,
     DAMPING_RATE,
     GAP,
     IMPACTS,
@@ -31,6 +33,7 @@ from per_obspy.kernels.pounding_events.motion import (
     STICKING_DELAY,
     STICKING_SPEED,
     TAYLOR,
+    TERM_COUNT,
     TRANSFERRED,
     UNLOADING,
     YIELD,
@@ -53,6 +56,9 @@ LOG_IMPULSE, LOG_DISPLACEMENT_1, LOG_DISPLACEMENT_2 = 6, 7, 8
 LOG_COLUMNS = 9
 #: An impact counts if its approach speed is above this (m/s) and above this share of the fastest.
 SLOWEST_COUNTED, COUNTED_SHARE = 1e-3, 1e-2
+#: Impacts of a row in lanes at most; touching rows whose masses differ by a factor of a million
+#: have more.
+MOST_IMPACTS = 1 << 22
 #: Clearance below which two structures touch at the instant of another contact, relative to
 #: displacements and gap.
 TOUCH_ROUNDING = 1e-12
@@ -73,14 +79,20 @@ def is_touching(row, j):
 
 
 @lean
-def log_impact(log, row, j, time, impulse, before_1, before_2):
-    """Write an impact that has just changed the velocities to the log, if it has room."""
-    # the number of impacts before this one is its line
+def _count_lines(row):
+    """Return the number of impacts of a row, which are lines of its log as long as it has room."""
     count = 0.0
     for k in range(row.shape[0] - 1):
         count += row[k, IMPACTS]
-    if count < log.shape[0]:
-        line = int(count)
+    return int(count)
+
+
+@lean
+def log_impact(log, row, j, time, impulse, before_1, before_2):
+    """Write an impact that has just changed the velocities to the log, if it has room."""
+    # the number of impacts before this one is its line
+    line = _count_lines(row)
+    if line < log.shape[0]:
         log[line, LOG_TIME] = time
         log[line, LOG_LEFT] = j
         log[line, LOG_IMPULSE] = impulse
@@ -93,17 +105,62 @@ def log_impact(log, row, j, time, impulse, before_1, before_2):
 
 
 @lean
+def _counting_limit(row, j):
+    """Return the approach speed up to which an impact does not count, by the fastest so far."""
+    return max(row[j, COUNTED_SPEED], COUNTED_SHARE * row[j, APPROACH])
+
+
+@lean
+def drop_uncounted(row, log):
+    """
+    Leave only those impacts of a row in lanes that still count in its log and in IMPACTS.
+
+    The fastest impact of an interface, which decides on the others, is known at the end only.
+    """
+    lines = _count_lines(row)
+    for j in range(row.shape[0]):
+        row[j, IMPACTS] = 0.0
+    kept = 0
+    # the others move up
+    for line in range(lines):
+        j = int(log[line, LOG_LEFT])
+        if log[line, LOG_BEFORE_1] - log[line, LOG_BEFORE_2] > _counting_limit(row, j):
+            for column in range(LOG_COLUMNS):
+                log[kept, column] = log[line, column]
+            row[j, IMPACTS] += 1.0
+            kept += 1
+
+
+@lean
 def has_room(row, log):
-    """Return whether the log holds every impact of a row so far."""
-    count = 0.0
-    for k in range(row.shape[0] - 1):
-        count += row[k, IMPACTS]
-    return count <= log.shape[0]
+    """
+    Return whether a row may go on after a step, and make room for the next one.
+
+    Its log must hold every impact that may count, and all its impacts must be MOST_IMPACTS at most.
+    """
+    row[0, ALL_IMPACTS] += row[0, BOUNCES]
+    lines = _count_lines(row)
+    if lines > log.shape[0] or row[0, ALL_IMPACTS] > MOST_IMPACTS:
+        return False
+    # half of the log for the next step
+    if 2 * lines > log.shape[0]:
+        drop_uncounted(row, log)
+    return True
+
+
+@lean
+def _never_counts(row, j, approach):
+    """Return whether an impact in lanes does not count, whatever the fastest of all will be."""
+    return row[0, TERM_COUNT] > 0.0 and approach <= _counting_limit(row, j)
 
 
 @lean
 def apply_impact(row, log, j, time):
-    """Apply one impact to the two structures of an interface: equations (7) to (10)."""
+    """
+    Apply one impact to the two structures of an interface: equations (7) to (10).
+
+    In lanes, which do not follow energies, an impact that never counts leaves no line.
+    """
     before_1 = row[j, V]
     before_2 = row[j + 1, V]
     approach = before_1 - before_2
@@ -111,6 +168,13 @@ def apply_impact(row, log, j, time):
     change = (1.0 + row[j, RESTITUTION]) * approach
     after_1 = before_1 - change * mass_share(row, j, j + 1, j + 1)
     after_2 = before_2 + change * mass_share(row, j, j + 1, j)
+    never_counts = _never_counts(row, j, approach)
+    row[j, APPROACH] = max(row[j, APPROACH], approach)
+    row[0, BOUNCES] += 1.0
+    if never_counts:
+        row[j, V] = after_1
+        row[j + 1, V] = after_2
+        return
     # impulse, from the structure that is no wall
     if row[j, MASS] < math.inf:
         impulse = row[j, MASS] * (before_1 - after_1)
@@ -121,11 +185,8 @@ def apply_impact(row, log, j, time):
     # transferred energies, (9) and (10) in their short form: impulse times mean velocity
     row[j, TRANSFERRED] += 0.5 * impulse * (before_1 + after_1)
     row[j + 1, TRANSFERRED] -= 0.5 * impulse * (before_2 + after_2)
-    # results and counters
-    row[j, APPROACH] = max(row[j, APPROACH], approach)
     log_impact(log, row, j, time, impulse, before_1, before_2)
     row[j, IMPACTS] += 1.0
-    row[0, BOUNCES] += 1.0
 
 
 @kernel

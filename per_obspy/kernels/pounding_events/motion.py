@@ -64,7 +64,7 @@ TAYLOR = 26
 EVENT_FUNCTION = 50
 
 # numbers that only the lanes use
-#: number of Taylor terms needed (first line only)
+#: number of Taylor terms needed (first line only); 0 in single histories
 TERM_COUNT = 74
 #: displacement and velocity after one elastic or yielding step, from unit velocity, by unit force
 #: and by unit ramp: six columns each
@@ -78,7 +78,9 @@ COUNTED_SPEED = OPENING
 #: Taylor coefficients of the displacement over the share of a step, from rest, with an acceleration
 #: that starts at 0 and grows by 1 per step (lanes only)
 RAMP_RESPONSE = 88
-ROW_COLUMNS = 112
+#: impacts of a row in all its steps so far (first line only; rows in lanes only)
+ALL_IMPACTS = 112
+ROW_COLUMNS = 113
 
 #: Largest angle omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1
 #: + xi)).

@@ -2,22 +2,12 @@
 
 import math
 
-import numpy as np
-
 from per_obspy.kernels._jit import kernel, lean
-from per_obspy.kernels.pounding_events.contact import (
-    COUNTED_SHARE,
-    LOG_BEFORE_1,
-    LOG_BEFORE_2,
-    LOG_LEFT,
-    SLOWEST_COUNTED,
-    has_room,
-)
+from per_obspy.kernels.pounding_events.contact import has_room
 from per_obspy.kernels.pounding_events.motion import (
-    APPROACH,
     BOUNCES,
-    IMPACTS,
     LARGEST_ENERGY_RADIUS_SQUARED,
+    TERM_COUNT,
     Segment,
     taylor_terms,
 )
@@ -68,7 +58,7 @@ def run_row_by_events(north, east, cosine, sine, dt, refinement, row, log, free_
         Whether it got through: no segment had too many events, and the log had room.
     """
     duration = dt / refinement
-    terms = taylor_terms(row, duration)
+    row[0, TERM_COUNT] = terms = taylor_terms(row, duration)
     # the energy radius is not computed
     row[:, LARGEST_ENERGY_RADIUS_SQUARED] = math.inf
     # the record
@@ -87,33 +77,3 @@ def run_row_by_events(north, east, cosine, sine, dt, refinement, row, log, free_
         if not _advance_interval(row, log, time, 0.0, 0.0, refinement, duration, terms):
             return False
     return True
-
-
-@kernel
-def count_row_impacts(row, log, scale):
-    """
-    Return the number of impacts of each interface that count, chatter left out.
-
-    Parameters
-    ----------
-    row : (n_buildings, ROW_COLUMNS) ndarray
-        Of the row at the end of its history; see `motion` for the columns.
-    log : (n_lines, LOG_COLUMNS) ndarray
-        Holds all its impacts.
-    scale : (n_buildings,) ndarray
-        Speed in the row over that at the contact height of each interface.
-
-    Returns
-    -------
-    (n_buildings,) ndarray of int
-        Impacts above SLOWEST_COUNTED, and above COUNTED_SHARE of the interface's fastest; 0 for
-        the last building.
-    """
-    counts = np.zeros(row.shape[0], np.int64)
-    lines = int(row[:, IMPACTS].sum())
-    for line in range(lines):
-        # the fastest is known at the end only
-        j = int(log[line, LOG_LEFT])
-        limit = max(SLOWEST_COUNTED * scale[j], COUNTED_SHARE * row[j, APPROACH])
-        counts[j] += log[line, LOG_BEFORE_1] - log[line, LOG_BEFORE_2] > limit
-    return counts

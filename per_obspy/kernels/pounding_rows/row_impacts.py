@@ -11,31 +11,25 @@ import math
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import first_fall
 from per_obspy.kernels.pounding_events.contact import (
-    COUNTED_SHARE,
     apply_impact,
     is_lingering,
     is_touching,
     resolve_contact,
 )
 from per_obspy.kernels.pounding_events.motion import (
-    APPROACH,
     BOUNCE_LIMIT,
-    BOUNCES,
     CLEARANCE_ORDER,
-    COUNTED_SPEED,
     EVENT_FUNCTION,
     GAP,
     GAP_ROUNDING,
     IN_CONTACT,
     LARGEST_DISPLACEMENT,
     PHASE,
-    RESTITUTION,
     STICKING_SPEED,
     UNLOADING,
     YIELD,
     U,
     V,
-    mass_share,
 )
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.lanes import (
@@ -262,35 +256,6 @@ def _is_alone(row, hit):
 
 
 @inlined
-def _never_counts(row, j):
-    """Return whether an impact does not count, whatever the fastest of its interface will be."""
-    limit = max(row[j, COUNTED_SPEED], COUNTED_SHARE * row[j, APPROACH])
-    return row[j, V] - row[j + 1, V] <= limit
-
-
-@inlined
-def _apply_unlogged(row, j):
-    """Apply one impact as ``apply_impact``, without a line of the log and without energies."""
-    approach = row[j, V] - row[j + 1, V]
-    # velocities after the impact, (7) and (8)
-    change = (1.0 + row[j, RESTITUTION]) * approach
-    row[j, V] -= change * mass_share(row, j, j + 1, j + 1)
-    row[j + 1, V] += change * mass_share(row, j, j + 1, j)
-    row[j, APPROACH] = max(row[j, APPROACH], approach)
-    row[0, BOUNCES] += 1.0
-
-
-@inlined
-def _apply_single_impact(row, log, hit, time, ground):
-    """Apply an impact; return whether both separate so slowly that they may stay in contact."""
-    if _never_counts(row, hit):
-        _apply_unlogged(row, hit)
-    else:
-        apply_impact(row, log, hit, time)
-    return is_lingering(row, hit, ground)
-
-
-@inlined
 def _pass_impact(members, row, log, window, hit, elapsed, segment):
     """
     Apply an impact in which no other building takes part; return whether both then part.
@@ -301,7 +266,8 @@ def _pass_impact(members, row, log, window, hit, elapsed, segment):
         return False
     time = elapsed * segment.duration
     ground = segment.acceleration + segment.slope * time
-    if _apply_single_impact(row, log, hit, time, ground):
+    apply_impact(row, log, hit, time)
+    if is_lingering(row, hit, ground):
         return False
     # both part
     row[hit, CLEARANCE_ORDER] = 1.0

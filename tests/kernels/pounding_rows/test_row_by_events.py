@@ -4,8 +4,8 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
+from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, drop_uncounted, has_room
+from per_obspy.kernels.pounding_rows.row_by_events import run_row_by_events
 from per_obspy.pounding.kernel_tables import KeptLogs, records_in_steps
 from per_obspy.pounding.row_maxima import run_logged_block
 
@@ -36,17 +36,25 @@ def test_events_and_lanes_agree():
     # both are exact but for the end of bounces
     index = [columns.LARGEST_DISPLACEMENT, columns.LARGEST_RADIUS_SQUARED, columns.APPROACH]
     assert_allclose(lines[:, index], row[:, index], rtol=1e-9)
-    assert_array_equal(count_row_impacts(row, log, np.ones(3)),
-                       count_row_impacts(lines, logs[0], np.ones(3)))  # fmt: skip
+    drop_uncounted(row, log)
+    drop_uncounted(lines, logs[0])
+    assert_array_equal(row[:, columns.IMPACTS], lines[:, columns.IMPACTS])
 
 
-def test_the_limit_of_counting_is_at_the_contact_height():
-    # catches: 1 mm/s of the table in place of the speed at the interface
+def test_only_impacts_that_count_keep_their_lines():
+    # catches: 1 mm/s of the table in place of the speed at the interface, a line that is lost or
+    # twice there, room that is made only when the log is already too short
     row, log = np.zeros((3, columns.ROW_COLUMNS)), np.zeros((4, LOG_COLUMNS))
     log[:, 1], log[:, 2] = [0, 0, 1, 1], [0.0015, 0.0009, 0.0015, 0.5]
+    row[:, columns.COUNTED_SPEED] = 1e-3
     row[0, columns.APPROACH], row[1, columns.APPROACH] = 0.0015, 0.5
     row[0, columns.IMPACTS], row[1, columns.IMPACTS] = 2, 2
     # 1.5 and 0.9 mm/s; 1.5 mm/s is below 1 % of 0.5 m/s
-    assert_array_equal(count_row_impacts(row, log, np.ones(3)), [1, 1, 0])
+    assert has_room(row, log)
+    assert_array_equal(row[:, columns.IMPACTS], [1, 1, 0])
+    assert_array_equal(log[:2, 1:3], [[0, 0.0015], [1, 0.5]])
     # the same speeds where the unit of the table is half as large
-    assert_array_equal(count_row_impacts(row, log, np.array([2.0, 1.0, 1.0])), [0, 1, 0])
+    row[0, columns.COUNTED_SPEED] = 2e-3
+    drop_uncounted(row, log)
+    assert_array_equal(row[:, columns.IMPACTS], [0, 1, 0])
+    assert_array_equal(log[0, 1:3], [1, 0.5])
