@@ -281,7 +281,8 @@ def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") 
     chances = [name for name in columns if name.endswith("probability")]
     shown = rounded_table(worst[list(columns)]).astype(dict.fromkeys(chances, object))
     for name in chances:
-        shown[name] = worst[name].map(percent)
+        # Chances of a year keep their digits
+        shown[name] = worst[name].map(percent) if name == "probability" else 100.0 * worst[name]
     units = {name: column.unit for name in columns if (column := known_column(name))}
     titles = list(column_aliases(columns, units | dict.fromkeys(chances, "%")).values())
     rows = shown.itertuples(index=False)

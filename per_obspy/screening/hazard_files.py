@@ -100,8 +100,8 @@ def read_hazard(path: Path, shape: Path | None = None) -> HazardSpectra:
     Raises
     ------
     CatalogError
-        If a file cannot be read, there are fewer than two probabilities or periods and no shape, or
-        a value is missing, implausible or does not grow with rarity.
+        If a file cannot be read, is no spectrum without a shape, or has a value that is missing,
+        implausible or does not grow with rarity.
     """
     if path.is_dir():
         curves = _curves_of_folder(path)
@@ -116,8 +116,7 @@ def read_hazard(path: Path, shape: Path | None = None) -> HazardSpectra:
         curves = [_curve(path, table, head)]
     if shape is not None:
         if len(curves) > 1:
-            names = ", ".join(sorted(curve.path.name for curve in curves))
-            raise CatalogError(str(path), f"shape: is for one measure alone, there are {names}")
+            raise CatalogError(str(path), f"shape: is for one measure, there are {len(curves)}")
         return _shaped(path, curves[0], read_design_spectrum(shape))
     # The peak is no ordinate of a spectrum
     curves = [curve for curve in curves if curve.period > 0.0]
