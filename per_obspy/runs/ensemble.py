@@ -134,12 +134,11 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     # Without any table there is still a header
     zeros = ", ".join(f"0::DOUBLE AS {name}" for name in (*SAME, *OF_SCENARIO))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
-    for number, table in enumerate(tables):
-        if table:
-            lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
-            wanted = ("pair_id", "configuration", *SAME, *OF_SCENARIO)
-            names = ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
-            rows.append(f"SELECT {number} AS scenario, {names} FROM table{number}")
+    rows += [
+        f"SELECT {number} AS scenario, {_names_in(table)} FROM table{number}"
+        for number, table in enumerate(tables)
+        if table
+    ]
     # Columns of probability and severity per scenario, extremes of columns that should be equal
     columns = [
         f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
@@ -154,6 +153,13 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
             GROUP BY pair_id ORDER BY pair_id
         ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS})
     """
+
+
+def _names_in(table: Sequence[Path]) -> str:
+    """Return the columns of a risk table for its query; NULL for those that it lacks."""
+    lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
+    wanted = ("pair_id", "configuration", *SAME, *OF_SCENARIO)
+    return ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
 
 
 def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
@@ -264,7 +270,7 @@ def _joined(
         name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
         for name, one in runs.items()
     }
-    scenarios = Scenarios(tables, settings.weights, settings.yearly, settings.target_rate)
+    scenarios = _scenarios(settings, tables)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
     # Results of the runs know buildings, stations and records
     scenarios_run = {
@@ -285,6 +291,10 @@ def _joined(
         "outputs": file_hashes(folder, [*files, *made.outputs]),
         "versions": software_versions(),
     }
+
+
+def _scenarios(settings: Ensemble, tables: Mapping[str, Sequence[Path]]) -> Scenarios:
+    return Scenarios(tables, settings.weights, settings.yearly, settings.target_rate)
 
 
 def _coverage(runs: Mapping[str, Result], counts: Mapping[str, int]) -> Coverage:

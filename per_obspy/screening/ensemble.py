@@ -209,12 +209,7 @@ def ensemble_rows(
     # Probabilities and severities over all scenarios
     columns: Columns = {"probability": conditional_probability(pounding, weight)}
     if yearly:
-        columns["annual_probability"] = annual_probability(pounding, weight)
-        quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
-        demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
-        needed = gap_for_rate(demands, weight, target_rate)
-        missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
-        columns |= dict(zip(GAPS, (needed, missing), strict=True))
+        columns |= _yearly_columns(rows, pounding, weights, target_rate)
     for severity, (name, unknown) in zip(severities, SEVERITY.items(), strict=True):
         beyond = np.nan_to_num(severity - unknown)
         columns[name] = unknown + _weighted_sum(beyond, weight / weight.sum())
@@ -222,6 +217,21 @@ def ensemble_rows(
     columns["worst_scenario"] = np.array(list(weights), dtype=object)[_worst(pounding, *severities)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
     return rows.assign(**columns)[names]
+
+
+def _yearly_columns(
+    rows: pd.DataFrame, pounding: FloatArray, rates: Mapping[str, float], target_rate: float
+) -> Columns:
+    """Return the annual probability of joined rows and the columns ``GAPS``."""
+    demands, rate = [], [*rates.values()]
+    for scenario in rates:
+        # NaN where an earlier version made the run
+        quantiles = rows.reindex(columns=[f"{name}_{scenario}" for name in DEMAND_SHARES])
+        demands.append(quantiles.to_numpy(np.float64).T)
+    needed = gap_for_rate(demands, rate, target_rate)
+    missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
+    columns = (annual_probability(pounding, rate), needed, missing)
+    return dict(zip(("annual_probability", *GAPS), columns, strict=True))
 
 
 def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatArray:
@@ -247,19 +257,15 @@ def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatAr
     ln_demand, rate = np.log(np.asarray(demands, dtype=np.float64)), np.asarray(rates)
     scores = ndtri([*DEMAND_SHARES.values()])[:, None] + np.zeros(ln_demand.shape[1:])
 
-    def contact_rate(ln_gap: FloatArray) -> FloatArray:
-        """Return the annual rate of contact at one gap per pair."""
-        shares = np.array([ndtr(-at_rows(one, scores, ln_gap)) for one in ln_demand])
-        return _weighted_sum(shares, rate)
-
-    # The rate falls as the gap grows
     low, high = np.full((2, ln_demand.shape[2]), np.log([[SMALLEST], [LARGEST]]))
-    is_enough = contact_rate(low) <= target
+    # The rate of contact falls as the gap grows
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        above = contact_rate(middle) > target
+        chances = np.array([ndtr(-at_rows(one, scores, middle)) for one in ln_demand])
+        above = _weighted_sum(chances, rate) > target
         low, high = np.where(above, middle, low), np.where(above, high, middle)
-    gap = np.where(is_enough, 0.0, np.exp(high))
+    # Where it was never above, no gap is needed
+    gap = np.where(low > np.log(SMALLEST), np.exp(high), 0.0)
     return np.where(np.isnan(ln_demand).any(axis=(0, 1)), np.nan, gap)
 
 
