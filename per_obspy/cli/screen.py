@@ -150,23 +150,13 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.report.page.background import require_background
     from per_obspy.runs.inputs.extras import require_extras
-    from per_obspy.screening.design import design_table, read_design_spectrum
-    from per_obspy.screening.hazard import hazard_table
-    from per_obspy.screening.hazard_files import is_hazard, read_hazard
 
     # Whatever would stop the report later
     settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     require_background(settings.report.background)
-    # Screen: by the hazard of many motions, or by one spectrum
-    pairs, given = read_pairs(settings.pairs), (settings.building, settings.screening)
-    if is_hazard(settings.spectrum):
-        hazard = read_hazard(settings.spectrum, settings.shape)
-        table = hazard_table(hazard, pairs, *given, settings.target_rate)
-    elif settings.shape is not None:
-        raise CatalogError(str(configuration), "shape: spectrum is no hazard curve that needs one")
-    else:
-        table = design_table(read_design_spectrum(settings.spectrum), pairs, *given)
+    pairs = read_pairs(settings.pairs)
+    table = _spectrum_table(settings, configuration, pairs)
     coverage = _coverage(settings, table)
     files, alert = _write_design(settings, table, coverage, output or settings.output)
 
@@ -175,6 +165,24 @@ def _screened_by_spectrum(configuration: Path, output: Path | None, language: La
     for sentence in pairs.attrs["suspicions"]:
         print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
     return Screened(table, coverage, files, alert)
+
+
+def _spectrum_table(
+    settings: "Design", configuration: Path, pairs: "pd.DataFrame"
+) -> "pd.DataFrame":
+    """Screen pairs by the hazard of many motions, or by one spectrum."""
+    from per_obspy.screening.design import design_table, read_design_spectrum
+    from per_obspy.screening.hazard import hazard_table
+    from per_obspy.screening.hazard_files import is_hazard, read_hazard
+
+    given = settings.building, settings.screening
+    if is_hazard(settings.spectrum):
+        hazard = read_hazard(settings.spectrum, settings.shape)
+        return hazard_table(hazard, pairs, *given, settings.target_rate)
+    # Without a hazard nothing is scaled
+    if settings.shape is not None:
+        raise CatalogError(str(configuration), "shape: spectrum is no hazard curve that needs one")
+    return design_table(read_design_spectrum(settings.spectrum), pairs, *given)
 
 
 def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
@@ -282,7 +290,8 @@ def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") 
     chances = [name for name in columns if name.endswith("probability")]
     shown = rounded_table(worst[list(columns)]).astype(dict.fromkeys(chances, object))
     for name in chances:
-        shown[name] = worst[name].map(percent)
+        # Chances of a year keep their digits
+        shown[name] = worst[name].map(percent) if name == "probability" else 100.0 * worst[name]
     units = {name: column.unit for name in columns if (column := known_column(name))}
     titles = list(column_aliases(columns, units | dict.fromkeys(chances, "%")).values())
     rows = shown.itertuples(index=False)

@@ -1,12 +1,16 @@
 """Figure of pairs under a hazard or rated scenarios: each gap, and that for the target rate."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from per_obspy.checks import FloatArray
 from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, save
+from per_obspy.screening.values import BoolArray
 
 #: Gaps below this are drawn on the edge, m: a logarithmic axis has no 0.
 NARROWEST = 0.001
@@ -37,16 +41,23 @@ def draw_gaps_for_target(table: pd.DataFrame, target_rate: float, path: Path) ->
     narrow = needed > gap
     unsure = ~narrow & (-np.log1p(-chance) > UNSURE * target_rate)
     sides = {"too narrow": narrow, "wide enough": ~narrow & ~unsure, "if the gap is right": unsure}
-    for (words, side), colour in zip(sides.items(), COLOURS, strict=True):
-        axes.loglog(gap[side], needed[side], ".", color=colour, label=f"{words}: {side.sum()}")
-    # The line of equal gaps
-    ends = [NARROWEST, max(*gap, *needed, 1.0)]
-    axes.plot(ends, ends, color=FAINT_COLOUR, linewidth=1.0)
-    axes.set(xlabel="gap (m); 1 mm and less on the edge", ylabel="gap for the target (m)")
+    _draw_sides(axes, gap, needed, sides)
     axes.set_title(f"Gap that contact exceeds once in {1.0 / target_rate:.0f} years", fontsize=11)
-    axes.legend(fontsize=8)
     # What one gap for all of them would do
     wide = np.sort(needed[narrow])
     filled.semilogx(wide, np.arange(wide.size) + 1, drawstyle="steps-post", marker=".")
     filled.set(xlabel="gap of all that are too narrow (m)", ylabel="pairs it makes wide enough")
     save(figure, path, False)
+
+
+def _draw_sides(
+    axes: Axes, gap: FloatArray, needed: FloatArray, sides: Mapping[str, BoolArray]
+) -> None:
+    """Draw gaps against those for the target in three colours, and the line of equal gaps."""
+    for (words, side), colour in zip(sides.items(), COLOURS, strict=True):
+        axes.loglog(gap[side], needed[side], ".", color=colour, label=f"{words}: {side.sum()}")
+    # Equal gaps
+    ends = [NARROWEST, max(*gap, *needed, 1.0)]
+    axes.plot(ends, ends, color=FAINT_COLOUR, linewidth=1.0)
+    axes.set(xlabel="gap (m); 1 mm and less on the edge", ylabel="gap for the target (m)")
+    axes.legend(fontsize=8)

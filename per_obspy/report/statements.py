@@ -200,18 +200,23 @@ def _inspections(hit: pd.DataFrame, results: Results) -> list[str]:
     # A plan mends joints, an earthquake is over
     if round(results.tally.hard) >= 1 and results.stem != "risk":
         steps.append(results.counted("todo_retrofit", _rounded(results.tally.hard)))
-    # Rates ask for the joints that contact visits most often
     if "missing_gap_for_target" in hit:
-        narrow = hit[hit["missing_gap_for_target"] > 0.0].nlargest(NAMED, "annual_probability")
-        gaps = (length_text(gap, results.language) for gap in narrow["gap_for_target"])
-        named = [f"{name} ({gap})" for name, gap in zip(narrow["pair_id"], gaps, strict=True)]
-        steps += [texts["todo_target"].format(names=_names(named))] if named else []
+        steps += _narrow_joints(hit, results)
     # One area is no choice
     if len(areas) > 1 and "expected_pounding" in areas:
         most = areas.sort_values("expected_pounding", ascending=False)[:3]
         places = [_placed_name(area) for _, area in most.iterrows()]
         steps.append(texts["todo_areas"].format(names="; ".join(places)))
     return steps
+
+
+def _narrow_joints(hit: pd.DataFrame, results: Results) -> list[str]:
+    """Return a sentence on the joints too narrow for the target that contact visits most often."""
+    narrow = hit[hit["missing_gap_for_target"] > 0.0].nlargest(NAMED, "annual_probability")
+    gaps = (length_text(gap, results.language) for gap in narrow["gap_for_target"])
+    # Each with the gap that would do
+    named = [f"{name} ({gap})" for name, gap in zip(narrow["pair_id"], gaps, strict=True)]
+    return [results.texts["todo_target"].format(names=_names(named))] if named else []
 
 
 def _placed_name(area: "pd.Series[Any]") -> str:

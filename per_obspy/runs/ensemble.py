@@ -143,15 +143,14 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
-    numbers = (*OF_SCENARIO, *SAME, *PERIODS)
+    numbers = (*SAME, *PERIODS, *OF_SCENARIO)
     zeros = ", ".join(f"0::DOUBLE AS {name}" for name in numbers)
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, '' AS configuration, {zeros} WHERE false"]
-    for number, table in enumerate(tables):
-        if table:
-            lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
-            wanted = ("pair_id", "configuration", *numbers)
-            names = ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
-            rows.append(f"SELECT {number} AS scenario, {names} FROM table{number}")
+    rows += [
+        f"SELECT {number} AS scenario, {_names_in(table)} FROM table{number}"
+        for number, table in enumerate(tables)
+        if table
+    ]
     # Columns of probability and severity per scenario, extremes of columns that should be equal
     columns = [
         f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
@@ -166,6 +165,13 @@ def _join_query(tables: Sequence[Sequence[Path]]) -> str:
             GROUP BY pair_id ORDER BY pair_id
         ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS})
     """
+
+
+def _names_in(table: Sequence[Path]) -> str:
+    """Return the columns of a risk table for its query; NULL for those that it lacks."""
+    lacking = {*DEMAND_SHARES}.difference(pq.read_schema(table[0].absolute()).names)
+    wanted = ("pair_id", "configuration", *SAME, *PERIODS, *OF_SCENARIO)
+    return ", ".join(f"NULL AS {name}" if name in lacking else name for name in wanted)
 
 
 def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
@@ -271,7 +277,7 @@ def _joined(
 ) -> dict[str, Any]:
     """Join the risk tables of the runs and return the results' part of ``ensemble.json``."""
     facts = {"name": settings.name, "simulated": str(simulated).lower()}
-    joined = Scenarios(_risk_tables(runs), settings.weights, settings.yearly, settings.target_rate)
+    joined = _scenarios(settings, _risk_tables(runs))
     files, counts = write_ensemble(joined, folder, facts, settings.csv_rows)
     # Results of the runs know buildings, stations and records
     scenarios_run = {
@@ -301,6 +307,10 @@ def _risk_tables(runs: Mapping[str, Result]) -> dict[str, list[Path]]:
         name: table_files(one.folder) if table_outputs(one.record["outputs"]) else []
         for name, one in runs.items()
     }
+
+
+def _scenarios(settings: Ensemble, tables: Mapping[str, Sequence[Path]]) -> Scenarios:
+    return Scenarios(tables, settings.weights, settings.yearly, settings.target_rate)
 
 
 def _coverage(runs: Mapping[str, Result], counts: Mapping[str, int]) -> Coverage:

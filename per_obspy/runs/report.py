@@ -277,10 +277,9 @@ def report_design(
         raise CatalogError("totals", f"area: the pair table has no column {area!r}")
     # The spectrum replaces the earthquake
     classes, language = list(settings.screening.classes), settings.report.language
-    texts, spectrum = LANGUAGES[language], name_text(settings.spectrum.name)
-    kind = "hazard" if "gap_for_target" in table else "spectrum"
-    region = _region(texts[f"{kind}_title"].format(name=spectrum), classes, simulated=False)
-    source = texts[kind].format(name=spectrum, years=_target_years(settings))
+    texts, kind = LANGUAGES[language], "hazard" if "gap_for_target" in table else "spectrum"
+    title, source = _spectrum_texts(settings, kind)
+    region = _region(title, classes, simulated=False)
     results = Results(
         "design", region, coverage, language, Revision(), [source],
         own=[*DESIGN, *HAZARD], class_limits=settings.screening.classes,
@@ -289,18 +288,24 @@ def report_design(
     pieces, outlines = iter([_with_flags(table)]), outlines_beside(settings.pairs)
     pairs = _pair_table(settings, pieces, len(table), settings.totals, outlines)
     write_report(results, pairs, folder, report)
-    if "gap_for_target" in table:
-        _draw_gaps(settings, table, folder, report)
+    if kind == "hazard":
+        _draw_gaps(settings, folder / "design.parquet", report)
     return report
 
 
-def _draw_gaps(
-    settings: Design | Ensemble, table: pd.DataFrame, folder: Path, report: Report
-) -> None:
+def _spectrum_texts(settings: Design, kind: str) -> tuple[str, str]:
+    """Return the title of a page and its sentence on a spectrum or hazard."""
+    texts = LANGUAGES[settings.report.language]
+    facts = {"name": name_text(settings.spectrum.name), "years": _target_years(settings)}
+    return texts[f"{kind}_title"].format(**facts), texts[kind].format(**facts)
+
+
+def _draw_gaps(settings: Design | Ensemble, table: Path, report: Report) -> None:
     """Draw the gaps for the target rate."""
-    figure = folder / "figures" / "gap_for_target.png"
+    figure = table.parent / "figures" / "gap_for_target.png"
     with report.tried(figure):
-        draw_gaps_for_target(table, settings.target_rate, figure)
+        gaps = pd.read_parquet(table, columns=["gap", "gap_for_target", "annual_probability"])
+        draw_gaps_for_target(gaps, settings.target_rate, figure)
 
 
 def _made_of(texts: Mapping[str, str], content: str) -> list[tuple[str, str]]:
@@ -355,8 +360,7 @@ def report_ensemble(
     pairs = _pair_table(settings, pieces, coverage.screened, runs.totals(), runs.outlines())
     write_report(results, pairs, folder, report)
     if settings.yearly:
-        gaps = pd.read_parquet(table, columns=["gap", "gap_for_target", "annual_probability"])
-        _draw_gaps(settings, gaps, folder, report)
+        _draw_gaps(settings, table, report)
     return report
 
 

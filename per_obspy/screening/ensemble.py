@@ -252,19 +252,15 @@ def gap_for_rate(demands: ArrayLike, rates: ArrayLike, target: float) -> FloatAr
     ln_demand, rate = np.log(np.asarray(demands, dtype=np.float64)), np.asarray(rates)
     scores = ndtri([*DEMAND_SHARES.values()])[:, None] + np.zeros(ln_demand.shape[1:])
 
-    def contact_rate(ln_gap: FloatArray) -> FloatArray:
-        """Return the annual rate of contact at one gap per pair."""
-        shares = np.array([ndtr(-at_rows(one, scores, ln_gap)) for one in ln_demand])
-        return _weighted_sum(shares, rate)
-
-    # The rate falls as the gap grows
     low, high = np.full((2, ln_demand.shape[2]), np.log([[SMALLEST], [LARGEST]]))
-    is_enough = contact_rate(low) <= target
+    # The rate of contact falls as the gap grows
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        above = contact_rate(middle) > target
+        chances = np.array([ndtr(-at_rows(one, scores, middle)) for one in ln_demand])
+        above = _weighted_sum(chances, rate) > target
         low, high = np.where(above, middle, low), np.where(above, high, middle)
-    gap = np.where(is_enough, 0.0, np.exp(high))
+    # Where it was never above, no gap is needed
+    gap = np.where(low > np.log(SMALLEST), np.exp(high), 0.0)
     return np.where(np.isnan(ln_demand).any(axis=(0, 1)), np.nan, gap)
 
 

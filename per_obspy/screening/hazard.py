@@ -85,6 +85,23 @@ def hazard_table(
     CatalogError
         If the target rate is outside the rates of the hazard.
     """
+    complete = kept_apart(completed_pairs(pairs, building))
+    site, reasons = _sites_of_pairs(hazard, complete, screening.largest_distance)
+    _add_reasons_of_rates(hazard, site, target_rate, reasons)
+    rejected = pair_rejections(complete, reasons, hazard.name)
+    # Rows of the pairs inside the hazard, worst first
+    inside = np.array([not why for why in reasons], dtype=bool)
+    within = complete[inside].reset_index(drop=True)
+    rows = _rows(hazard, within, site[inside], screening, target_rate)
+    ranked = _ordered(rows)
+    ranked.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
+    return ranked
+
+
+def _add_reasons_of_rates(
+    hazard: HazardSpectra, site: IndexArray, target_rate: float, reasons: list[list[str]]
+) -> None:
+    """Add why a pair has no spectrum of the target rate."""
     # Beyond its rates a hazard says nothing
     covered = (hazard.rates[:, -1] <= target_rate) & (target_rate <= hazard.rates[:, 0])
     if not covered.any():
@@ -94,20 +111,11 @@ def hazard_table(
         raise CatalogError(
             hazard.name, f"target_rate = {target_rate:g} is outside its {span} 1/year"
         )
-    complete = kept_apart(completed_pairs(pairs, building))
-    site, reasons = _sites_of_pairs(hazard, complete, screening.largest_distance)
+    # Sites have rates of their own
     for row in np.flatnonzero(~covered[site]):
         first, last = hazard.rates[site[row], [0, -1]]
         span = f"{last:.3g} to {first:.3g} 1/year" if first > last else "no rates"
         reasons[row].append(f"target_rate = {target_rate:g} is outside the nearest site's {span}")
-    rejected = pair_rejections(complete, reasons, hazard.name)
-    # Rows of the pairs inside the hazard, worst first
-    inside = np.array([not why for why in reasons], dtype=bool)
-    within = complete[inside].reset_index(drop=True)
-    rows = _rows(hazard, within, site[inside], screening, target_rate)
-    ranked = _ordered(rows)
-    ranked.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
-    return ranked
 
 
 def _ordered(rows: pd.DataFrame) -> pd.DataFrame:
@@ -165,7 +173,8 @@ def _annual_columns(
         )
         for rows in _blocks(len(table))
     ]
-    return {name: np.concatenate([part[name] for part in parts]) for name in HAZARD}
+    whole = pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+    return {name: whole[name].to_numpy() for name in HAZARD}
 
 
 def _block_columns(
@@ -201,7 +210,7 @@ def _at_rate(hazard: HazardSpectra, site: IndexArray, rate: FloatArray) -> MapMo
     lower = np.clip(
         (hazard.rates[site] >= rate[:, None]).sum(axis=1) - 1, 0, hazard.sd.shape[1] - 2
     )
-    first, last = (np.log(hazard.rates[site, level]) for level in (lower, lower + 1))
+    first, last = np.log(hazard.rates[site, lower]), np.log(hazard.rates[site, lower + 1])
     share = ((np.log(rate) - first) / (last - first))[:, None]
     ln_sd = (1.0 - share) * np.log(hazard.sd[site, lower])
     ln_sd += share * np.log(hazard.sd[site, lower + 1])

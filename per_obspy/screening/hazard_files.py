@@ -100,9 +100,10 @@ def read_hazard(path: Path, shape: Path | None = None) -> HazardSpectra:
     Raises
     ------
     CatalogError
-        If a file cannot be read, there are fewer than two probabilities or periods and no shape, or
-        a value is missing, implausible or does not grow with rarity.
+        If a file cannot be read, is no spectrum without a shape, or has a value that is missing,
+        implausible or does not grow with rarity.
     """
+    # One file of spectra, else curves
     if path.is_dir():
         curves = _curves_of_folder(path)
     else:
@@ -116,8 +117,7 @@ def read_hazard(path: Path, shape: Path | None = None) -> HazardSpectra:
         curves = [_curve(path, table, head)]
     if shape is not None:
         if len(curves) > 1:
-            names = ", ".join(sorted(curve.path.name for curve in curves))
-            raise CatalogError(str(path), f"shape: is for one measure alone, there are {names}")
+            raise CatalogError(str(path), f"shape: is for one measure, there are {len(curves)}")
         return _shaped(path, curves[0], read_design_spectrum(shape))
     # The peak is no ordinate of a spectrum
     curves = [curve for curve in curves if curve.period > 0.0]
@@ -175,19 +175,26 @@ def _levels(table: pd.DataFrame, path: Path) -> tuple[FloatArray, FloatArray, li
 
 
 def _curves_of_folder(path: Path) -> list[HazardCurve]:
-    """Return the curves of a folder of PGA and SA, of the kind mean if there are several kinds."""
+    """Return the curves of a folder of PGA and SA."""
     curves = list[HazardCurve]()
     for file in filter(is_hazard, sorted(path.glob("*.csv"))):
         table, head = _table(file)
+        # Other measures, deviations and other results may lie beside them
         has_curve = _intensity_names(table) and _MEASURE.search(head)
         if has_curve and _fact(_KIND, head) != "std":
             curves.append(_curve(file, table, head))
+    return _of_one_kind(path, curves)
+
+
+def _of_one_kind(path: Path, curves: Sequence[HazardCurve]) -> list[HazardCurve]:
+    """Return the curves of the kind mean, or of the only kind, each measure once."""
     kinds = sorted({curve.kind for curve in curves})
     if len(kinds) > 1 and "mean" not in kinds:
         raise CatalogError(str(path), f"has curves of {', '.join(kinds)} and no mean: keep one")
     curves = [curve for curve in curves if len(kinds) == 1 or curve.kind == "mean"]
     if not curves:
         raise CatalogError(str(path), "has no hazard curve of PGA or SA (*.csv)")
+    # Files of two calculations
     files: dict[float, str] = {}
     for curve in curves:
         if files.setdefault(curve.period, curve.path.name) != curve.path.name:
@@ -207,26 +214,38 @@ def _fact(pattern: re.Pattern[str], head: str) -> str:
     return fact[1] if fact else ""
 
 
+def _intensities(path: Path, names: Sequence[str]) -> FloatArray:
+    """Return the intensities of the columns of a curve, m/s2."""
+    found = [_INTENSITY.fullmatch(name) for name in names]
+    values = np.array([float(one[1]) if one else np.nan for one in found]) * STANDARD_GRAVITY
+    # Other units, or a repeated column
+    is_plausible = ((values > 0.0) & (values <= LARGEST["psa"][0])).all()
+    if len(values) < 2 or not is_plausible or len({*values.tolist()}) < len(values):
+        reason = "needs two intensities in g or more, each once, as poe-0.0050000"
+        raise CatalogError(str(path), reason)
+    return values
+
+
+def _chances(path: Path, places: pd.DataFrame, chance: FloatArray) -> FloatArray:
+    """Check and return probabilities of rising intensities."""
+    _require(path, ((chance >= 0.0) & (chance <= 1.0)).all(axis=1), "a probability is not 0 to 1")
+    falls = (np.diff(chance, axis=1) <= 0.0).all(axis=1)
+    _require(path, falls, "the probability grows with the intensity")
+    # Of several curves of one place chance would take one
+    _require_one_of_each(path, places, chance)
+    return chance
+
+
 def _curve(path: Path, table: pd.DataFrame, head: str) -> HazardCurve:
     """Return the hazard curves of a file."""
     measure, names = _MEASURE.search(head), _intensity_names(table)
     if measure is None:
         raise CatalogError(str(path), "needs imt='PGA' or such as imt='SA(0.5)' in its first line")
-    found = [_INTENSITY.fullmatch(name) for name in names]
-    values = np.array([float(one[1]) if one else np.nan for one in found])
-    intensities = values * STANDARD_GRAVITY
-    is_plausible = ((intensities > 0.0) & (intensities <= LARGEST["psa"][0])).all()
-    if len(values) < 2 or not is_plausible or len({*values.tolist()}) < len(values):
-        reason = "needs two intensities in g or more, each once, as poe-0.0050000"
-        raise CatalogError(str(path), reason)
+    intensities = _intensities(path, names)
     # Columns in any order
     order = np.argsort(intensities)
     places = _places(path, table)
-    chance = _numbers(table, [names[i] for i in order])
-    _require(path, ((chance >= 0.0) & (chance <= 1.0)).all(axis=1), "a probability is not 0 to 1")
-    falls = (np.diff(chance, axis=1) <= 0.0).all(axis=1)
-    _require(path, falls, "the probability grows with the intensity")
-    _require_one_of_each(path, places, chance)
+    chance = _chances(path, places, _numbers(table, [names[i] for i in order]))
     # A certain motion has an infinite rate
     with np.errstate(divide="ignore"):
         rates = -np.log1p(-chance) / _years(path, head)
@@ -243,6 +262,7 @@ def _joined(path: Path, curves: Sequence[HazardCurve]) -> HazardSpectra:
         if not np.array_equal(curve.places, curves[0].places):
             raise CatalogError(str(curve.path), f"has other sites than {curves[0].path.name}")
     periods, rates = np.array([curve.period for curve in curves]), _common_rates(curves)
+    # SD = PSA (T / 2 pi)^2
     psa = np.stack([_at_rates(curve, rates) for curve in curves], axis=-1)
     sd = psa * (periods / (2.0 * np.pi)) ** 2
     east, north = curves[0].places.T
@@ -251,22 +271,30 @@ def _joined(path: Path, curves: Sequence[HazardCurve]) -> HazardSpectra:
 
 def _shaped(path: Path, curve: HazardCurve, shape: DesignSpectrum) -> HazardSpectra:
     """Return the spectra of one shape that have the ordinate of a curve."""
+    _require_ordinate(curve, shape)
     dampings, periods = shape.dampings, shape.periods
-    if not dampings[0] <= REFERENCE_DAMPING <= dampings[-1]:
-        raise CatalogError(shape.name, "shape: needs a damping of 0.05")
-    if not (periods[0] <= (curve.period or PEAK_PERIOD) and curve.period <= periods[-1]):
-        measure = f"SA({curve.period:g})" if curve.period else f"PGA, at {PEAK_PERIOD:g} s or less"
-        raise CatalogError(shape.name, f"shape: has no ordinate for the curve of {measure}")
     # SD at 5 % damping, the last at the period of the curve, or at the shortest one
     wanted = np.append(periods, max(curve.period, periods[0]))
     spectra = LogSpectra(np.log(periods), np.log(dampings), np.log(shape.sd)[None])
     ln_damping = np.full(wanted.size, np.log(REFERENCE_DAMPING))
     row = np.zeros(wanted.size, dtype=np.intp)
     sd = np.exp(stored_log(spectra, row, np.log(wanted), ln_damping))
+    # Every rate has the same shape
     ordinate, rates = sd[-1] * (2.0 * np.pi / wanted[-1]) ** 2, _common_rates([curve])
     scale = _at_rates(curve, rates)[:, :, None] / ordinate
     east, north = curve.places.T
     return HazardSpectra(str(path), east, north, rates, periods, scale * sd[:-1])
+
+
+def _require_ordinate(curve: HazardCurve, shape: DesignSpectrum) -> None:
+    """Refuse a shape that has no ordinate at the period of a curve, with its damping."""
+    if not shape.dampings[0] <= REFERENCE_DAMPING <= shape.dampings[-1]:
+        raise CatalogError(shape.name, "shape: needs a damping of 0.05")
+    # The peak is the ordinate of the shortest period
+    periods = shape.periods
+    if not (periods[0] <= (curve.period or PEAK_PERIOD) and curve.period <= periods[-1]):
+        measure = f"SA({curve.period:g})" if curve.period else f"PGA, at {PEAK_PERIOD:g} s or less"
+        raise CatalogError(shape.name, f"shape: has no ordinate for the curve of {measure}")
 
 
 def _common_rates(curves: Sequence[HazardCurve]) -> FloatArray:
@@ -320,6 +348,7 @@ def _places(path: Path, table: pd.DataFrame) -> pd.DataFrame:
     """Return longitudes and latitudes of the sites, degrees."""
     if not {"lon", "lat"} <= {*table} or table.empty:
         raise CatalogError(str(path), "needs lon, lat and a site")
+    # As numbers, NaN where there is none
     places: pd.DataFrame = table[["lon", "lat"]].apply(pd.to_numeric, errors="coerce")
     east, north = places.to_numpy(np.float64).T
     _require(path, (np.abs(east) <= 180.0) & (np.abs(north) <= 90.0), "lon, lat: not in degrees")

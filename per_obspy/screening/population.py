@@ -330,12 +330,8 @@ def demand_quantiles(demands: FloatArray, log_std: FloatArray, nodes: FloatArray
 
 
 def at_rows(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
-    """
-    Interpolate ``y`` at one ``at`` per pair, linear also beyond the ends.
-
-    ``x`` (rising) and ``y`` are (n_points, n_pairs), ``at`` (n_pairs,). Equal values of ``x`` are a
-    step.
-    """
+    """Interpolate ``y``, (n_points, n_pairs), at one ``at`` a pair, linear also beyond the ends."""
+    # Equal values of x, which rises, are a step
     x = x + 1e-9 * np.arange(len(x))[:, None]
     lower = np.clip((x <= at).sum(axis=0) - 1, 0, len(x) - 2)
     pair = np.arange(at.size)

@@ -91,6 +91,17 @@ def test_every_scenario_is_run_and_the_probabilities_are_joined(copied, capsys):
     assert_allclose(table["annual_probability"], 1 - np.exp(-0.01 * large - 0.03 * small))
     assert_allclose(table["probability"], 0.25 * large + 0.75 * small)
     assert table.loc["c", "probability"] == 1.0  # touching buildings meet in any earthquake
+    # the gap for the target lies between those that both scenarios together do not exceed: at the
+    # demand of 98 % in both contact is rarer than a fiftieth of the rates, at that of 2 % hardly
+    assert 0.02 * 0.04 < 1 / 475 < 0.98 * 0.04
+    names = ("large", "small")
+    runs = [pd.read_parquet(copied / n / "risk.parquet").set_index("pair_id") for n in names]
+    lowest = np.minimum(*(run["demand_02"].reindex(table.index) for run in runs))
+    highest = np.maximum(*(run["demand_98"].reindex(table.index) for run in runs))
+    assert table["gap_for_target"].between(lowest, highest).all()
+    missing = (table["gap_for_target"] - table["gap"]).clip(lower=0.0)
+    assert_allclose(table["missing_gap_for_target"], missing)
+    assert (copied / "both" / "figures" / "gap_for_target.png").is_file()
 
 
 def test_the_same_again_does_nothing_and_a_new_rate_runs_nothing(copied, capsys):
@@ -180,6 +191,10 @@ WRONG = {
     ),
     "infinite": (("rate = 0.03", "rate = inf"), "scenario.1.rate: Input should be a finite number"),
     "all 0": (("rate = 0.03", "rate = 0.0"), "weights or rates must have a positive sum"),
+    "no rarer target": (
+        ('output = "both"', 'output = "both"\ntarget_rate = 0.04'),
+        "target_rate = 0.04 is not below the sum of the rates, 0.04 1/year",
+    ),
     "same name": (('name = "small"', 'name = "Large"'), "name: 'Large' occurs twice"),
     "same run": (
         ("small.toml", "large.toml"),

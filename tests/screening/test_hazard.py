@@ -307,7 +307,7 @@ def test_a_shape_that_does_not_fit(tmp_path):
     long = write_curve(tmp_path / "long.csv", 5.0)
     for hazard, given, reason in (
         (uhs, shape, "is of spectra, which need no shape"),
-        (write_curves(tmp_path / "c"), shape, "is for one measure alone"),
+        (write_curves(tmp_path / "c"), shape, "is for one measure, there are 5"),
         (peak, write_shape(tmp_path / "t.csv", shortest=0.06), "no ordinate for the curve of PGA"),
         (long, shape, r"no ordinate for the curve of SA\(5\)"),
         (peak, write_shape(tmp_path / "u.csv", damping=0.02), "needs a damping of 0.05"),
