@@ -325,8 +325,7 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
 def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     """Return the motion at the medians, (n_pairs, 1), and the factor of impact velocities there."""
     site, exact = block.site, values(block.table, "demand_exact")
-    azimuth = values(block.table, "azimuth_used")
-    _, velocity = exact_approach(block.station, block.table, azimuth)
+    _, velocity = exact_approach(block.station, block.table, block.table["azimuth_used"])
     columns = exact[:, None], velocity[:, None], site.ln_field[:, None]
     moving = _at_site(block, np.zeros((1, NODES.shape[1])), *columns)
     demand = moving.demand[:, 0]

@@ -308,7 +308,7 @@ def test_an_uncertain_strength_is_that_of_drawn_histories(station):
     )  # fmt: skip
     drawn = (hit.impact_velocity > 0.0).mean()
     assert 0.2 < drawn < 0.8
-    # 128 nodes: wrong by less than 0.021 at 95 of 100 pairs; a standard error of drawn ones is 0.011
+    # 128 nodes: wrong by less than 0.021 at 95 of 100 pairs; standard error of drawn ones: 0.011
     assert table["probability"].iloc[0] == 1.0
     assert_allclose(table["probability"].iloc[1], drawn, atol=0.032)
 
