@@ -283,11 +283,12 @@ def yielding_approach(
     structures = _structures(pairs)
     largest = np.empty((2, structures.shape[1]))
     # each pair with its own number of steps per sampling interval
-    parts = np.ceil(pairs.frequency.max(axis=0, initial=0.0) * step / LARGEST_ANGLE).astype(int)
+    parts = np.ceil(pairs.frequency.max(axis=0) * step / LARGEST_ANGLE).astype(int)
     for number in np.unique(parts).tolist():
         alike = parts == number
         # the kernel fills a whole array
-        some, own = structures[:, alike].copy(), np.empty((2, np.count_nonzero(alike)))
+        some = np.compress(alike, structures, axis=1)
+        own = np.empty((2, some.shape[1]))
         shaken = number * (record.shape[1] - 1)
         fill_approach(*_in_steps(record, step, number), step / number, shaken, some, own)
         largest[:, alike] = own
