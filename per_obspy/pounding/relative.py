@@ -281,14 +281,14 @@ def yielding_approach(
     step = checks.number("dt", dt, checks.positive)
     record = closed_record(ground_motion(acceleration))
     structures = _structures(pairs)
-    largest = np.empty((2, structures.shape[1]))
+    largest = np.empty_like(structures[:2])
     # each pair with its own number of steps per sampling interval
     parts = np.ceil(pairs.frequency.max(axis=0) * step / LARGEST_ANGLE).astype(int)
     for number in np.unique(parts).tolist():
         alike = parts == number
         # the kernel fills a whole array
         some = np.compress(alike, structures, axis=1)
-        own = np.empty((2, some.shape[1]))
+        own = np.empty_like(some[:2])
         shaken = number * (record.shape[1] - 1)
         fill_approach(*_in_steps(record, step, number), step / number, shaken, some, own)
         largest[:, alike] = own
