@@ -93,7 +93,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
       correlation.
     """
     table = _Columns(pairs)
-    # Masonry and anything unknown are one system
+    # Unknown systems are one
     systems = {f"system_{i}": _system(table, i) for i in (1, 2)}
     # Sizes and periods before contacts and masses, which need those of both
     for i in (1, 2):
@@ -154,7 +154,7 @@ class _Columns:
 
 
 def _system(table: _Columns, i: int) -> pd.Series:
-    """Return the structural system of building i: other for masonry and anything unknown."""
+    """Return the structural system of building i: other for anything unknown."""
     name, unknown = f"system_{i}", pd.Series("", index=table.pairs.index)
     given = table.pairs.get(name, unknown)
     table.derived[name] = (given == "").to_numpy(dtype=bool)

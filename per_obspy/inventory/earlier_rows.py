@@ -30,9 +30,9 @@ _QUANTITIES = (
     ("height", 0, 13, 10),
     ("number of storeys", 13, 8, 0),
     ("period", 21, 9, 18),
-    ("system", 30, 3, 0),
-    ("place", 33, 12, 3),
-    ("place", 45, 12, 3),
+    ("system", 30, 4, 0),
+    ("place", 34, 12, 3),
+    ("place", 46, 12, 3),
 )
 
 #: Odd numbers that spread whole numbers over 64 bits (digits of pi).

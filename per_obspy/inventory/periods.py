@@ -30,6 +30,8 @@ _COEFFICIENTS = {
     "concrete_frame_wall": (1.0, 0.0488, 0.75, 0.050, 0.4),
     "concrete_wall": (1.0, 0.0488, 0.75, 0.050, 0.4),
     "ebf_brbf": (1.0, 0.0731, 0.75, 0.075, 0.3),
+    "masonry": (1.0, 0.0488, 0.75, 0.050, 0.4),
+    "reinforced_masonry": (1.0, 0.0488, 0.75, 0.050, 0.4),
     "other": (1.0, 0.0488, 0.75, 0.050, 0.4),
 }
 EC8_HEIGHT = 40.0
@@ -41,8 +43,8 @@ EC8_HEIGHT = 40.0
 #: period's. Even nine tower blocks of one design at one site have different frequencies ("Dynamic
 #: response of nine similar tower blocks", by Ellis and Littler from memory; summary only).
 ALIKE, ONE_SYSTEM, OTHERS = 0.85, 0.5, 0.2
-#: Chance that two neighbours have one system where one is ``other`` (masonry or unknown), of equal
-#: and of other numbers of storeys: surveyors noted one system at 0.87 and 0.75 of touching pairs of
+#: Chance that two neighbours have one system where one is ``other``, of equal and of other numbers
+#: of storeys: surveyors noted one system at 0.87 and 0.75 of touching pairs of
 #: San José and at 0.56 and 0.32 of Guatemala City (``workflows/outline_accuracy.py``); rounded
 #: means.
 ONE_SYSTEM_OF_EQUAL_STOREYS, ONE_SYSTEM_OF_OTHERS = 0.7, 0.5

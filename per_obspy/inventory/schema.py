@@ -10,13 +10,16 @@ from collections.abc import Collection
 from math import inf
 from typing import NamedTuple
 
-#: Structural systems for which period formulas exist; masonry and anything unknown is ``other``.
+#: Structural systems: walls of masonry without reinforcement (adobe and earth too) and with it
+#: (confined too); timber, infilled frames and anything unknown are ``other``.
 SYSTEMS = (
     "steel_mrf",
     "concrete_mrf",
     "concrete_frame_wall",
     "concrete_wall",
     "ebf_brbf",
+    "masonry",
+    "reinforced_masonry",
     "other",
 )
 

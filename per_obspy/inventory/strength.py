@@ -4,8 +4,8 @@ Yield capacity of buildings by structural system, storeys and code level, from H
 HAZUS gives each class of building a capacity curve: spectral acceleration over spectral
 displacement of its equivalent oscillator, linear up to yield and rising from there to an ultimate
 point. The values are those of the moderate code level; low and high code have a half and twice of
-them. They are medians of a stock designed for the western United States; buildings of other codes
-are weaker or stronger, without a sign of it in a pair table.
+them, but for unreinforced masonry. They are medians of a stock designed for the western United
+States; buildings of other codes are weaker or stronger, without a sign of it in a pair table.
 """
 
 from typing import Literal
@@ -24,16 +24,24 @@ MID_RISE, HIGH_RISE = 4.0, 8.0
 
 #: System -> yield acceleration, g, of low-, mid- and high-rise buildings; stiffness from yield to
 #: the ultimate point over that before, ``(A_u / A_y - 1) / (D_u / D_y - 1)``: HAZUS-MH classes S1,
-#: C1, C2 (reasoned for frames with walls) and S2 (braced steel, reasoned for ebf_brbf), moderate
-#: code (table 5.7 of the technical manual), as in ``RHazusBuildingModel.cpp`` of
-#: github.com/steva44/Rts. The manual itself was not at hand. Masonry and unknown systems have none.
+#: C1, C2 (reasoned for frames with walls), S2 (braced steel, reasoned for ebf_brbf) and RM1, RM2
+#: (reinforced masonry, reasoned for confined one), moderate code, and URM, which has the same
+#: values without and with the low code and none above (also for high-rise and for adobe and earth,
+#: of which HAZUS has no class). Table 5.7 of the technical manual, as in
+#: ``RHazusBuildingModel.cpp`` of github.com/steva44/Rts; the manual itself was not at hand. Other
+#: systems have none.
 _CAPACITIES = {
     "steel_mrf": ((0.125, 0.078, 0.049), (0.12, 0.18, 0.25)),
     "concrete_mrf": ((0.125, 0.104, 0.049), (0.12, 0.18, 0.25)),
     "concrete_frame_wall": ((0.200, 0.167, 0.127), (0.11, 0.17, 0.23)),
     "concrete_wall": ((0.200, 0.167, 0.127), (0.11, 0.17, 0.23)),
     "ebf_brbf": ((0.200, 0.167, 0.127), (0.09, 0.14, 0.20)),
+    "reinforced_masonry": ((0.267, 0.222, 0.169), (0.09, 0.14, 0.20)),
+    "masonry": ((0.200, 0.111, 0.111), (0.11, 0.18, 0.18)),
 }
+
+#: Systems whose capacity is that of every code level.
+_WITHOUT_CODE = ("masonry",)
 
 #: Log-standard deviation of an assumed yield capacity: reasoned, one code level on either side
 #: being a factor of two.
@@ -71,7 +79,8 @@ def hazus_yield_displacement(
     >>> hazus_yield_displacement(0.75, ["concrete_mrf", "other"], 5, "moderate").round(4)
     array([0.0145,    nan])
     """
-    acceleration = CODE_LEVELS[code_level] * STANDARD_GRAVITY * _of_class(system, storeys, 0)
+    level = np.where(np.isin(system, _WITHOUT_CODE), 1.0, CODE_LEVELS[code_level])
+    acceleration = level * STANDARD_GRAVITY * _of_class(system, storeys, 0)
     return np.asarray(acceleration * (np.asarray(period) / (2.0 * np.pi)) ** 2)
 
 

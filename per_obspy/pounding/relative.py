@@ -280,29 +280,37 @@ def yielding_approach(
         yield_displacement_2=yield_displacement_2,
         hardening_2=hardening_2,
     )
-    step, record = (
-        checks.number("dt", dt, checks.positive),
-        closed_record(ground_motion(acceleration)),
-    )
-    # zeros after the record, up to a whole number of rounds
-    shaken = record.shape[1] - 1
-    rounds = -(-(shaken + int(FREE_VIBRATION / step)) // CHECKED_STEPS)
-    samples = np.arange(rounds * CHECKED_STEPS + 1)
-    # structures in the order of the kernel
+    step = checks.number("dt", dt, checks.positive)
+    record = closed_record(ground_motion(acceleration))
+    structures = _structures(pairs)
+    largest = np.empty_like(structures[:2])
+    # each pair with its own number of steps per sampling interval
+    parts = np.ceil(pairs.frequency.max(axis=0) * step / LARGEST_ANGLE).astype(int)
+    for number in np.unique(parts).tolist():
+        alike = parts == number
+        # the kernel fills a whole array
+        some = np.compress(alike, structures, axis=1)
+        own = np.empty_like(some[:2])
+        shaken = number * (record.shape[1] - 1)
+        fill_approach(*_in_steps(record, step, number), step / number, shaken, some, own)
+        largest[:, alike] = own
+    return Approach(*largest.reshape(2, *pairs.shape))
+
+
+def _structures(pairs: Pairs) -> FloatArray:
+    """Return pairs that may yield in the rows of the kernel, (12, n_pairs)."""
     angle, fields = np.radians(pairs.azimuth), (pairs.frequency, pairs.damping, pairs.participation)
     numbers = np.stack([*fields, pairs.yield_displacement, pairs.hardening], axis=1)
-    numbers = np.concatenate([numbers.reshape(10, -1), [np.cos(angle), np.sin(angle)]])
-    # each pair with its steps per sampling interval
-    largest = np.empty((2, angle.size))
-    parts = np.ceil(pairs.frequency.max(axis=0, initial=0.0) * step / LARGEST_ANGLE).astype(int)
-    for number in np.unique(parts).tolist():
-        times = np.arange(samples[-1] * number + 1) / number
-        motion = (np.interp(times, samples[: shaken + 1], one, right=0.0) for one in record)
-        own = np.empty((2, np.count_nonzero(parts == number)))
-        chosen = np.ascontiguousarray(numbers[:, parts == number])
-        fill_approach(*motion, step / number, shaken * number, chosen, own)
-        largest[:, parts == number] = own
-    return Approach(*largest.reshape(2, *pairs.shape))
+    return np.concatenate([numbers.reshape(10, -1), [np.cos(angle), np.sin(angle)]])
+
+
+def _in_steps(record: FloatArray, dt: float, parts: int) -> FloatArray:
+    """Return a record in equal parts of its sampling intervals, and zeros after it."""
+    last = record.shape[1] - 1
+    # whole rounds of the kernel
+    rounds = -(-(last + int(FREE_VIBRATION / dt)) // CHECKED_STEPS)
+    times = np.arange(rounds * CHECKED_STEPS * parts + 1) / parts
+    return np.stack([np.interp(times, np.arange(last + 1), one, right=0.0) for one in record])
 
 
 def _maxima(

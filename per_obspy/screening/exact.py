@@ -70,6 +70,7 @@ def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
     """Return the axis from 1 to 2 along which the record demands the largest gap, degrees."""
     shares = both(pairs, "participation")
     azimuth = worst_azimuth(*station.components, *oscillators(pairs), *shares)
+    # one of the axes, of buildings that yield
     weak = np.flatnonzero(can_yield(pairs))
     if weak.size:
         along = np.repeat(AXES, weak.size)
@@ -182,6 +183,7 @@ def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) ->
     For the nodes of a population: that of buildings that yield is not exact.
     """
     relative, yields = np.empty((2, azimuth.size)), can_yield(table)
+    # linear pairs take the shorter computation
     if not yields.all():
         arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
         relative[:, ~yields] = approach(*station.components, *arguments)

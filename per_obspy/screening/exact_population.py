@@ -33,6 +33,7 @@ from per_obspy.config import Screening
 from per_obspy.kernels.pairs.node_outcomes import QUANTILE
 from per_obspy.screening.estimates import ROUND_OFF
 from per_obspy.screening.exact import (
+    can_yield,
     exact_approach,
     record_supports,
 )
@@ -243,7 +244,7 @@ def _sampled(block: _Block, count: int) -> Columns:
 
 def _of_nodes(block: _Block, motion: RelativeMotion, nodes: FloatArray) -> Columns:
     """Return the population of uncertain buildings, with a probability that the nodes can show."""
-    uncertain = Uncertain(motion, block.site.log_std, np.ones(len(motion.demand)))
+    uncertain = Uncertain(motion, block.site.log_std, _factor_of_yielding(block))
     outcome = population(uncertain, block.table, nodes)
     lowest, highest = resolved_probability(motion.demand, median_gap(block.table))
     return outcome | {"probability": np.clip(outcome["probability"], lowest, highest)}
@@ -325,8 +326,7 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
 def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     """Return the motion at the medians, (n_pairs, 1), and the factor of impact velocities there."""
     site, exact = block.site, values(block.table, "demand_exact")
-    azimuth = values(block.table, "azimuth_used")
-    _, velocity = exact_approach(block.station, block.table, azimuth)
+    _, velocity = exact_approach(block.station, block.table, block.table["azimuth_used"])
     columns = exact[:, None], velocity[:, None], site.ln_field[:, None]
     moving = _at_site(block, np.zeros((1, NODES.shape[1])), *columns)
     demand = moving.demand[:, 0]
@@ -339,3 +339,14 @@ def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     known = (velocity > 0.0) & (estimate > 0.0)
     factor = np.divide(velocity, estimate, out=np.ones_like(velocity), where=known)
     return moving, np.clip(factor, SMALLEST_FACTOR, LARGEST_FACTOR)
+
+
+def _factor_of_yielding(block: _Block) -> FloatArray:
+    """Return the factor at the medians where a building yields and only dampings are uncertain."""
+    table, factor = block.table, np.ones(block.motion.row.size)
+    # far from the medians the history there says little
+    spread = np.maximum(both(table, "period_log_std"), both(table, "yield_log_std")).max(axis=0)
+    rows = np.flatnonzero(can_yield(table) & (spread == 0.0))
+    if rows.size:
+        _, factor[rows] = _at_the_medians(block.rows(rows))
+    return factor

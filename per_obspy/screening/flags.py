@@ -72,6 +72,7 @@ def elastic_ratios(table: Table) -> dict[str, FloatArray]:
     """
     ratios = {}
     for i, is_assumed in enumerate(strength_is_assumed(table), start=1):
+        # NaN where the system is unknown
         ratio = values(table, f"sd_{i}") / values(table, f"hazus_yield_{i}")
         not_given = is_assumed | np.isinf(values(table, f"yield_displacement_{i}"))
         ratios[f"elastic_ratio_{i}"] = np.where(not_given, ratio, np.nan)

@@ -210,6 +210,7 @@ def _not_less_by_assumption(
     It is that of linear buildings there, up to the smallest of the next state.
     """
     probability, smallest = values(table, "probability").copy(), screening.states.unlikely
+    # the same pairs again, as if they stayed linear
     is_assumed = np.any(strength_is_assumed(pairs), axis=0)
     rows = np.flatnonzero(is_assumed & (probability < smallest))
     if rows.size:

@@ -20,9 +20,9 @@ from per_obspy.inventory.schema import COLUMNS, POSITIONS, SYSTEMS
 #: Simulated columns by name, each (count,); numbers or text.
 Columns = dict[str, Any]
 
-#: Shares of the systems in the order of ``SYSTEMS``: concrete frames and masonry ("other")
-#: dominate, buildings with concrete walls are left out.
-SYSTEM_SHARES = (0.10, 0.50, 0.0, 0.0, 0.05, 0.35)
+#: Shares of the systems in the order of ``SYSTEMS``: concrete frames and unknown ones dominate,
+#: buildings with walls of concrete or masonry are left out.
+SYSTEM_SHARES = (0.10, 0.50, 0.0, 0.0, 0.05, 0.0, 0.0, 0.35)
 
 #: Median and log-standard deviation of the number of storeys, and its largest value.
 STOREYS, MOST_STOREYS = (4.0, 0.6), 35

@@ -140,7 +140,7 @@ def test_the_worked_pairs_are_those_of_the_tutorial(folder):
         )
         assert (gap, demand, rule, probability, state, impact, severity) == expected
     # numbers of the text below the table
-    assert table.loc["touching", "impacts"] == 180
+    assert table.loc["touching", "impacts"] == 66
     assert table.loc["yielding", ["ductility_1", "ductility_2"]].round(1).tolist() == [3.3, 1.6]
     assert round(table.loc["yielding", "demand_estimated"], 3) == 0.065
     assert round(table.loc["yielding", "missing_gap"], 3) == 0.009

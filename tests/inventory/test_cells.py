@@ -205,13 +205,15 @@ def test_placeholders_of_other_columns_and_never_of_places_or_gaps():
 
 @pytest.mark.parametrize(
     ("text", "system"),
-    [("Betonarme", "concrete_mrf"), ("BETONARME", "concrete_mrf"), ("Yığma", "other"),
+    [("Betonarme", "concrete_mrf"), ("BETONARME", "concrete_mrf"), ("Yığma", "masonry"),
      ("hormigón armado", "concrete_mrf"), ("Hormigon Armado", "concrete_mrf"),
-     ("mampostería", "other"), ("béton armé", "concrete_mrf"), ("muratura", "other"),
-     ("Mauerwerk", "other"), ("鉄筋コンクリート", "concrete_mrf"), ("RC造", "concrete_mrf"),
+     ("mampostería", "masonry"), ("béton armé", "concrete_mrf"), ("muratura", "masonry"),
+     ("Mauerwerk", "masonry"), ("鉄筋コンクリート", "concrete_mrf"), ("RC造", "concrete_mrf"),
      ("鉄骨造", "steel_mrf"), ("Çelik", "steel_mrf"), ("perde", "concrete_wall"),
      ("Concrete_MRF", "concrete_mrf"), ("木造", "other"), ("?", ""), ("", ""),
-     ("cemento armato", "concrete_mrf"), ("alvenaria", "other"), ("shear walls", "concrete_wall")],
+     ("mampostería confinada", "reinforced_masonry"), ("piedra", "masonry"),
+     ("cemento armato", "concrete_mrf"), ("alvenaria", "masonry"),
+     ("shear walls", "concrete_wall")],
 )  # fmt: skip
 def test_structural_systems_in_several_languages(text, system):
     read, notes = read_texts("system_1", pd.Series([text]))

@@ -274,7 +274,15 @@ def _by_taxonomy(table: pd.DataFrame, source: Source) -> pd.DataFrame:
     return table.assign(**pd.DataFrame(texts.map(known).tolist(), table.index, names))
 
 
+def _by_masonry(table: pd.DataFrame, _: Source) -> pd.DataFrame:
+    """Return the survey with the material of masonry, else the system, as a code."""
+    code = table.get("structural_system", pd.Series("", table.index)).fillna("").astype(str)
+    material = table.get("llrs_material", code).fillna("").astype(str).str.split("/").str[0]
+    return table.assign(masonry_code=code.mask((code == "M") & (material != ""), material))
+
+
 _RULES = {
+    "SeismicBuildingExposure": _by_masonry,
     "OpenStreetMap": _with_tags,
     "Overture Maps": _above_ground,
     "National Structure Inventory": _people_at_night,

@@ -61,12 +61,12 @@ def yielding_approach(north, east, dt, shaken, pairs, largest):
         for lane in range(LANES):
             _pack(pairs, min(first + lane, pairs.shape[1] - 1), dt, table, lane)
         local = aligned_line(table, ROWS, LANES)
+        # the record, and free vibration as long as it counts
         for step in range(0, north.size - 1, CHECKED_STEPS):
             if step >= shaken and _is_settled(local):
                 break
             _flush(local)
             for i in range(step, step + CHECKED_STEPS, 4):
-                # samples at the ends of four steps
                 n0, n1, n2, n3, n4 = (
                     north[i],
                     north[i + 1],
@@ -76,6 +76,7 @@ def yielding_approach(north, east, dt, shaken, pairs, largest):
                 )
                 e0, e1, e2, e3, e4 = east[i], east[i + 1], east[i + 2], east[i + 3], east[i + 4]
                 _step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+        # maxima of the block without the copies
         for lane in range(min(LANES, pairs.shape[1] - first)):
             largest[0, first + lane] = local[DISTANCE + lane]
             largest[1, first + lane] = local[SPEED + lane]
@@ -84,6 +85,7 @@ def yielding_approach(north, east, dt, shaken, pairs, largest):
 @lean
 def _pack(pairs, number, dt, table, lane):
     """Fill the column of a pair at rest."""
+    # at rest
     for row in range(ROWS):
         table[row, lane] = 0.0
     for body in range(2):
@@ -94,16 +96,20 @@ def _pack(pairs, number, dt, table, lane):
         )
         # acceleration of a plastic displacement of 1
         drive = -(1.0 - pairs[column + 4, number]) * omega * omega
+        # displacement after a step
         table[row + 3, lane], table[row + 4, lane] = a11, a12
         table[row + 5, lane] = drive * (b11 + b12)
         table[row + 6, lane], table[row + 7, lane] = share * b11, share * b12
+        # velocity over omega after it
         table[row + 8, lane], table[row + 9, lane] = a21, a22
         table[row + 10, lane] = drive * (b21 + b22)
         table[row + 11, lane], table[row + 12, lane] = share * b21, share * b22
+        # what yielding changes
         table[row + 13, lane], table[row + 14, lane] = drive * b12, drive * b22
         table[row + 15, lane] = pairs[column + 3, number]
         table[row + 16, lane] = 1.0 / (1.0 - drive * b12)
         table[row + 17, lane], table[row + 18, lane] = omega, pairs[column + 4, number]
+    # direction
     table[DIRECTION, lane], table[DIRECTION + 1, lane] = pairs[10, number], pairs[11, number]
 
 
@@ -119,32 +125,44 @@ def _flush(t):
 
 @vectorised
 def _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
-    """Advance a block by four steps."""
+    """Advance a block by four steps between five samples, north and east."""
     for lane in range(LANES):
-        # accelerations along the azimuth, and states of structures 1 and 2
+        other = SECOND + lane
+        # accelerations along the azimuth
         cosine, sine = t[NORTH + lane], t[EAST + lane]
         a0, a1, a2 = cosine * n0 + sine * e0, cosine * n1 + sine * e1, cosine * n2 + sine * e2
         a3, a4 = cosine * n3 + sine * e3, cosine * n4 + sine * e4
-        u, z, p = t[U + lane], t[Z + lane], t[P + lane]
-        w, y, r = t[SECOND + U + lane], t[SECOND + Z + lane], t[SECOND + P + lane]
-        omega, omega_2 = t[OMEGA + lane], t[SECOND + OMEGA + lane]
+        # states of structures 1 and 2, and the largest values so far
+        u, z, p, w, y, r = (
+            t[U + lane],
+            t[Z + lane],
+            t[P + lane],
+            t[U + other],
+            t[Z + other],
+            t[P + other],
+        )
+        omega, omega_2 = t[OMEGA + lane], t[OMEGA + other]
         distance, speed = t[DISTANCE + lane], t[SPEED + lane]
-        # relative displacement and velocity after each step
+        # first step
         u, z, p = _moved(t, lane, u, z, p, a0, a1)
-        w, y, r = _moved(t, SECOND + lane, w, y, r, a0, a1)
+        w, y, r = _moved(t, other, w, y, r, a0, a1)
         distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        # second step
         u, z, p = _moved(t, lane, u, z, p, a1, a2)
-        w, y, r = _moved(t, SECOND + lane, w, y, r, a1, a2)
+        w, y, r = _moved(t, other, w, y, r, a1, a2)
         distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        # third step
         u, z, p = _moved(t, lane, u, z, p, a2, a3)
-        w, y, r = _moved(t, SECOND + lane, w, y, r, a2, a3)
+        w, y, r = _moved(t, other, w, y, r, a2, a3)
         distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        # fourth step
         u, z, p = _moved(t, lane, u, z, p, a3, a4)
-        w, y, r = _moved(t, SECOND + lane, w, y, r, a3, a4)
-        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        w, y, r = _moved(t, other, w, y, r, a3, a4)
+        # states and largest values after them
         t[U + lane], t[Z + lane], t[P + lane] = u, z, p
-        t[SECOND + U + lane], t[SECOND + Z + lane], t[SECOND + P + lane] = w, y, r
-        t[DISTANCE + lane], t[SPEED + lane] = distance, speed
+        t[U + other], t[Z + other], t[P + other] = w, y, r
+        t[DISTANCE + lane] = max(distance, u - w)
+        t[SPEED + lane] = max(speed, omega * z - omega_2 * y)
 
 
 @inlined

@@ -185,7 +185,7 @@ def test_a_table_without_names_is_named_by_its_rows_and_says_so(tmp_path):
     assert "no pair_id: each pair is named by its row, as 'row 2'" in pairs.attrs["recognised"]
     assert pairs["pair_id"].tolist() == ["row 2", "row 4"]
     assert pairs["building_id_1"].tolist() == ["Ev", "Cami"]
-    assert pairs["system_1"].tolist() == ["concrete_mrf", "other"]
+    assert pairs["system_1"].tolist() == ["concrete_mrf", "masonry"]
     assert pairs["storeys_1"].tolist() == [5.0, 5 - 1]
     assert pairs["gap"].tolist()[0] == 0.0
     assert pairs["gap"].isna().tolist()[1]

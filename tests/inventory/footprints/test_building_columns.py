@@ -109,7 +109,11 @@ def test_a_survey_of_seismic_building_exposure():
     table = schema_columns(pd.DataFrame(SURVEY, index=[2, 5]), "town.gpkg")
     assert table["building_id"].tolist() == ["7", "feature 5"]
     assert table["storeys"].tolist() == [3.0, 2.0]
-    assert table["system"].tolist() == ["concrete_mrf", "other"]
+    assert table["system"].tolist() == ["concrete_mrf", "masonry"]
+    # reinforced walls are known by their material
+    material = SURVEY | {"llrs_material": ["CR", "MCF/RS"]}
+    table = schema_columns(pd.DataFrame(material, index=[2, 5]), "town.gpkg")
+    assert table["system"].tolist() == ["concrete_mrf", "reinforced_masonry"]
     assert table["touches_left"].tolist()[0] == "True"  # carried along
     assert "floor_height" not in table  # decimetres in one city
 

@@ -101,7 +101,9 @@ def test_building_types_of_hazus(tmp_path):
     for code, system in (
         ("C1", "concrete_mrf"),
         ("S1M", "steel_mrf"),
-        ("URML", "other"),
+        ("URML", "masonry"),
+        ("RM1M", "reinforced_masonry"),
+        ("W1", "other"),
         ("?", ""),
     ):
         path.write_text(text.replace('"StructureType": "C1"', f'"StructureType": "{code}"'))
