@@ -109,21 +109,17 @@ def page_drawings(
         The ground motion of the run.
     """
     records = worst.filter(HISTORY_COLUMNS), ground.stations
-    tasks = [("histories", partial(pair_histories, *records))]
+    tasks: list[_Task] = [("histories", partial(pair_histories, *records))]
     if "probability" not in worst or "derived" not in worst:
-        return Drawings(**_computed(tasks, context), radii=_radii(stations))
+        return Drawings(histories=_computed(tasks, context)["histories"], radii=_radii(stations))
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
     tasks.append(("sensitivity", partial(_sensitivities, chosen, ground, context.settings)))
-    return Drawings(
-        _station_drawings(worst, stations),
-        **_computed(tasks, context),
-        worst=min(len(known), WORST),
-        doubtful=len(doubt),
-        radii=_radii(stations),
-    )
+    found, counts = _computed(tasks, context), (min(len(known), WORST), len(doubt))
+    shown = _station_drawings(worst, stations), found["histories"], found["sensitivity"]
+    return Drawings(*shown, *counts, _radii(stations))
 
 
 #: Name of a part of the drawings, and how it is computed.
