@@ -42,9 +42,6 @@ from per_obspy.screening.ranking import velocity_of_unknown
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000
 
-#: Groups of interfaces that are read together.
-GROUPS = 10
-
 #: Buildings that are written together.
 RANKED = 50_000
 
@@ -98,6 +95,7 @@ def rows_without_histories(contacts: Path) -> Iterator[pa.Table]:
     schema = schema_of(ROWS)
     for table in groups_of(contacts):
         columns = list[pa.Array | pa.ChunkedArray]()
+        # Outcomes of histories are empty, as is every other number that is not known
         for field in schema:
             known = field.name in table.column_names
             column = table[field.name] if known else pa.nulls(table.num_rows, field.type)
@@ -210,12 +208,10 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
     ):
         carried = [name for name in (*OF_PAIRS, AREA) if name in second.schema_arrow.names]
         unknown_by = [name for name in _UNKNOWN_BY if name in carried]
-        # Both files have the same rows in the same groups; the cells of few have to be named anew
-        count = first.num_row_groups
-        for start in range(0, count, GROUPS):
-            groups = list(range(start, min(start + GROUPS, count)))
-            table = first.read_row_groups(groups, columns=list(_OF_ROWS), use_threads=False)
-            pairs = second.read_row_groups(groups, columns=carried, use_threads=False)
+        # Both files have the same rows in the same groups
+        for group in range(first.num_row_groups):
+            table = first.read_row_group(group, columns=list(_OF_ROWS), use_threads=False)
+            pairs = second.read_row_group(group, columns=carried, use_threads=False)
             columns = {name: table[name] for name in _OF_ROWS if name not in _PLACES}
             columns |= directions(table["azimuth"], table["flags"])
             columns["area"] = _areas(table, pairs, totals)

@@ -54,6 +54,7 @@ class CellCounts:
 
     def _join(self, keys: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
         """Take numbers of pairs, those of one cell and kind together."""
+        # Ordered by column, row and kind
         order = np.lexsort(keys.T[::-1])
         keys = keys[order]
         first = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1))[: order.size])

@@ -64,7 +64,7 @@ def explained(
             # The leading columns are those of the package
             with ranked_table(files) as table:
                 worst = table.first(PAGE_PAIRS, table.schema.names[: 2 * MOST_COLUMNS])
-            drawings = page_drawings(context, worst, stations, ground)
+            drawings = page_drawings(context.settings, worst, stations, ground)
             write_drawings(drawings, folder / WORST_PAIRS)
     return report
 
