@@ -328,13 +328,7 @@ def _columns_of_rows(
     sizes, first, pair = np.diff(chains.first), chains.first[:-1], chains.pair
     row = np.repeat(np.arange(sizes.size), sizes)
     names = pairs["station"].to_pandas().to_numpy(object)[pair]
-    # A row of two has the station of its pair
-    station, several = names[first], np.zeros(first.size, dtype=bool)
-    longer = np.flatnonzero(sizes > 1)
-    of_longer = np.isin(row, longer)
-    station[longer], several[longer] = serving_stations(
-        row[of_longer], names[of_longer], numbers_in(pairs, "distance")[pair][of_longer]
-    )
+    station, several = serving_stations(row, names, numbers_in(pairs, "distance")[pair])
     flags = chains.flags | {"several_stations": several, "no_record": station == ""}
     of_rows = {
         "row_id": _row_names(contacts, pair, first),

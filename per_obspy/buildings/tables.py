@@ -95,6 +95,7 @@ def rows_without_histories(contacts: Path) -> Iterator[pa.Table]:
     schema = schema_of(ROWS)
     for table in groups_of(contacts):
         columns = list[pa.Array | pa.ChunkedArray]()
+        # Outcomes of histories are empty, as is every other number that is not known
         for field in schema:
             known = field.name in table.column_names
             column = table[field.name] if known else pa.nulls(table.num_rows, field.type)

@@ -182,14 +182,13 @@ def near_towns(longitude: ArrayLike, latitude: ArrayLike, size: float = 1000.0) 
     names, at_east, at_north, _, tree = _towns()
     # The nearest town along the chord, and the way from there
     nearest = tree.query(_on_sphere(east, north))[1]
+    town_names = {town: json.loads(names[town]) for town in np.unique(nearest).tolist()}
     way = metres_between(at_east[nearest], at_north[nearest], east, north)
     # Half of the size is the last digit that tells two places apart
     decimals = max(math.ceil(-math.log10(size / 2000.0)), 0)
     columns = (nearest, np.stack(way, axis=1), north, east)
     texts = [
-        _way(json.loads(names[town]), to, decimals)
-        if math.hypot(*to) < FAR
-        else _degrees(y, x, decimals)
+        _way(town_names[town], to, decimals) if math.hypot(*to) < FAR else _degrees(y, x, decimals)
         for town, to, y, x in zip(*(column.tolist() for column in columns), strict=True)
     ]
     return np.array(texts, dtype=object)

@@ -32,7 +32,9 @@ class CellCounts:
         """Begin without a pair."""
         self.classes, self.states = tuple(classes), tuple(states)
         self.size = SMALLEST_CELL
-        self._counts: Counter[tuple[int, int, int]] = Counter()
+        # Column, row and kind, in their order, and the pairs of each
+        self._keys = np.empty((0, 3), dtype=np.int64)
+        self._counts = np.empty(0, dtype=np.int64)
 
     def add(self, pairs: pd.DataFrame) -> None:
         """Count pairs by place, class and state; those without a place are left out."""
@@ -43,23 +45,25 @@ class CellCounts:
         # A class and a state are one kind
         kind = len(self.states) * _codes(placed["risk_class"], self.classes)
         kind += _codes(placed["state"], self.states)
-        # Pairs of one cell and kind together: rows of whole tables are compared slowly
-        order = np.lexsort([kind, row, column])
-        keys = np.stack([column, row, kind], axis=1)[order]
-        first = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1))[: order.size])
-        counts = np.diff(first, append=order.size)
-        for key, count in zip(keys[first].tolist(), counts.tolist(), strict=True):
-            self._counts[key[0], key[1], key[2]] += count
-        while len({key[:2] for key in self._counts}) > MOST_CELLS:
-            self._enlarge()
+        keys = np.concatenate([self._keys, np.stack([column, row, kind], axis=1)])
+        self._join(keys, np.append(self._counts, np.ones(len(placed), np.int64)))
+        while len(self._keys) and self._cells() > MOST_CELLS:
+            # Twice the size
+            self.size *= 2.0
+            self._join(self._keys // np.array([2, 2, 1]), self._counts)
 
-    def _enlarge(self) -> None:
-        """Double the size of the cells."""
-        self.size *= 2.0
-        joined: Counter[tuple[int, int, int]] = Counter()
-        for (column, row, kind), count in self._counts.items():
-            joined[column // 2, row // 2, kind] += count
-        self._counts = joined
+    def _join(self, keys: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
+        """Take numbers of pairs, those of one cell and kind together."""
+        # Ordered by column, row and kind
+        order = np.lexsort(keys.T[::-1])
+        keys = keys[order]
+        first = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1))[: order.size])
+        self._keys, self._counts = keys[first], np.add.reduceat(counts[order], first)
+
+    def _cells(self) -> int:
+        """Return the number of cells that hold a pair."""
+        places = self._keys[:, :2]
+        return 1 + int((places[1:] != places[:-1]).any(axis=1).sum())
 
     def table(self) -> pd.DataFrame:
         """
@@ -67,9 +71,10 @@ class CellCounts:
 
         The name of a kind is the number of its class and the number of its state.
         """
-        if not self._counts:
+        if not len(self._keys):
             return pd.DataFrame(columns=["longitude", "latitude"], dtype=float)
-        counts = pd.Series(dict(self._counts)).unstack(fill_value=0)
+        index = pd.MultiIndex.from_arrays(list(self._keys.T))
+        counts = pd.Series(self._counts, index).unstack(fill_value=0)
         # Names cannot be those of a hostile class
         kinds = (divmod(int(kind), len(self.states)) for kind in counts.columns)
         counts.columns = pd.Index([f"{code} {state}" for code, state in kinds])

@@ -5,6 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.buildings.search import IDENTIFIERS, AllRows, chunks_of, find_rows
@@ -14,6 +15,7 @@ from per_obspy.buildings.tables import (
     write_buildings,
     write_rows,
 )
+from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.ranked_table import ranked_table, table_files
@@ -66,21 +68,21 @@ def building_rows(
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
         found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
-        exact, parts = settings.rows.exact, list[Part]()
-        if settings.screening.exact if exact is None else exact:
-            tasks = _tasks(folder, ground, found)
-            parts = _parts(tasks, context.workers, found.contacts)
-            interfaces = rows_of_parts(part.path for part in parts if part.path)
-        else:
-            # Nothing is left to compute
-            interfaces = rows_without_histories(found.file)
+        tasks = _tasks(settings, folder, ground, found)
+        parts = _parts(tasks, context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
-        outputs = write_rows(interfaces, folder, facts)
+        outputs = write_rows(_interfaces(found, parts), folder, facts)
         outputs += write_buildings(folder, found.file, settings, facts)
     rejected = (*found.rejected, *rejections(parts))
     failed = any(part.failed for part in parts)
     return BuildingRowsDone(outputs, _counts(found, folder, parts), rejected, failed, found.served)
+
+
+def _interfaces(found: AllRows, parts: Sequence[Part]) -> Iterator[pa.Table]:
+    """Return the interfaces of all parts; of all contacts where no part had to be made."""
+    files = [part.path for part in parts if part.path]
+    return rows_of_parts(files) if files else rows_without_histories(found.file)
 
 
 def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
@@ -94,8 +96,11 @@ def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, in
     }
 
 
-def _tasks(folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
-    """Yield one task per chunk of rows."""
+def _tasks(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
+    """Yield one task per chunk of rows, none if histories are not wanted: nothing is left to do."""
+    exact = settings.rows.exact
+    if not (settings.screening.exact if exact is None else exact):
+        return
     stations = {station.name: station for station in ground.stations}
     for number, table in enumerate(chunks_of(found.file)):
         # Pairs that a map serves have no record

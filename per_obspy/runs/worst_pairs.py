@@ -1,15 +1,12 @@
 """
 What explains the worst pairs of a run: their histories, sensitivities, and records of stations.
 
-They are computed once, after the screening, and kept in ``worst_pairs.json``. Histories and
-sensitivities are two tasks of the workers.
+They are computed once, after the screening, and kept in ``worst_pairs.json``.
 """
 
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
-from operator import itemgetter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +21,8 @@ from per_obspy.files import written_whole
 from per_obspy.pounding.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
 from per_obspy.report.results import Drawings
-from per_obspy.runs.provenance import RunContext
 from per_obspy.runs.stations import file_stem
-from per_obspy.runs.tasks.ground_files import (
-    GroundFiles,
-    StationFile,
-    read_ground,
-    read_station_once,
-)
-from per_obspy.runs.tasks.parallel import Work, results
+from per_obspy.runs.tasks.ground_files import GroundFiles, read_ground, read_station_once
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
@@ -89,7 +79,7 @@ def read_drawings(path: Path) -> Drawings:
 
 
 def page_drawings(
-    context: RunContext,
+    settings: Run,
     worst: pd.DataFrame,
     stations: Sequence[FinishedStation],
     ground: GroundFiles,
@@ -99,8 +89,8 @@ def page_drawings(
 
     Parameters
     ----------
-    context : RunContext
-        The run.
+    settings : Run
+        Of the run.
     worst : DataFrame
         Pairs of the page with the package's columns of the risk table.
     stations : sequence of FinishedStation
@@ -108,50 +98,25 @@ def page_drawings(
     ground : GroundFiles
         The ground motion of the run.
     """
-    records = worst.filter(HISTORY_COLUMNS), ground.stations
-    tasks = [("histories", partial(pair_histories, *records))]
+    histories, radii = pair_histories(worst, stations), _radii(stations)
     if "probability" not in worst or "derived" not in worst:
-        return Drawings(**_computed(tasks, context), radii=_radii(stations))
+        return Drawings({}, histories, radii=radii)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
-    tasks.append(("sensitivity", partial(_sensitivities, chosen, ground, context.settings)))
-    return Drawings(
-        _station_drawings(worst, stations),
-        **_computed(tasks, context),
-        worst=min(len(known), WORST),
-        doubtful=len(doubt),
-        radii=_radii(stations),
-    )
-
-
-#: Name of a part of the drawings, and how it is computed.
-_Task = tuple[str, Callable[[], dict[int, Any]]]
-
-
-def _computed(tasks: Sequence[_Task], context: RunContext) -> dict[str, dict[int, Any]]:
-    """Return the parts of the drawings by name, computed side by side."""
-    return dict(results(tasks, Work(_compute, _refuse, itemgetter(0)), context.workers))
-
-
-def _compute(task: _Task) -> tuple[str, dict[int, Any]]:
-    name, compute = task
-    return name, compute()
-
-
-def _refuse(task: _Task, reason: str) -> tuple[str, dict[int, Any]]:
-    """Raise the reason: one part that fails leaves the page without any."""
-    raise RuntimeError(f"{task[0]}: {reason}")
+    rows = _sensitivities(chosen, read_ground(ground), settings)
+    counts = min(len(known), WORST), len(doubt)
+    return Drawings(_station_drawings(worst, stations), histories, rows, *counts, radii)
 
 
 def _sensitivities(
-    pairs: pd.DataFrame, files: GroundFiles, settings: Run
+    pairs: pd.DataFrame, ground: RegionalMotion, settings: Run
 ) -> dict[int, list[list[Any]]]:
     """Return the sensitivities of pairs by their rank, the largest change first."""
     ranks = dict(zip(pairs["pair_id"], pairs["rank"], strict=True))
     found: dict[int, list[list[Any]]] = {}
-    for one in _each(pairs, read_ground(files), settings):
+    for one in _each(pairs, ground, settings):
         ends = [float(f"{value:.4g}") for value in (one.low, one.high)]
         chances = [round(value, 4) for value in (one.probability_low, one.probability_high)]
         row = [one.name, *ends, *chances, one.state_low, one.state_high]
@@ -193,7 +158,7 @@ MOST_SAMPLES = 200_000
 
 
 def pair_histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation | StationFile]
+    worst: pd.DataFrame, stations: Iterable[FinishedStation]
 ) -> dict[int, dict[str, Any]]:
     """
     Return the histories of the worst pairs with a gap and a record, by their rank.
@@ -202,7 +167,7 @@ def pair_histories(
     ----------
     worst : DataFrame
         Rows of a risk table, worst first.
-    stations : iterable of FinishedStation or StationFile
+    stations : iterable of FinishedStation
         With station files.
     """
     if not set(HISTORY_COLUMNS) <= set(worst):

@@ -286,8 +286,11 @@ def _joint_columns(rows: pd.DataFrame, weights: Mapping[str, float], yearly: boo
 
 def _gap_columns(rows: pd.DataFrame, weights: Mapping[str, float], target_rate: float) -> Columns:
     """Return the gap that the target asks for, and by how much the gap is too small, m."""
-    quantiles = ([f"{name}_{scenario}" for name in DEMAND_SHARES] for scenario in weights)
-    demands = [rows.reindex(columns=one).to_numpy(np.float64).T for one in quantiles]
+    demands = []
+    for scenario in weights:
+        # NaN where an earlier version made the run
+        quantiles = rows.reindex(columns=[f"{name}_{scenario}" for name in DEMAND_SHARES])
+        demands.append(quantiles.to_numpy(np.float64).T)
     needed = gap_for_rate(demands, np.array([*weights.values()]), target_rate)
     missing = np.maximum(needed - rows["gap"].to_numpy(np.float64), 0.0)
     return dict(zip(GAPS, (needed, missing), strict=True))

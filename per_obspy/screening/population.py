@@ -84,7 +84,8 @@ def _sobol_points() -> FloatArray:
     """Return the second 128 Sobol points, (128, 9), in the order of the Gray code."""
     number, bit = np.arange(128, 256), np.arange(8)
     gray = (number ^ number >> 1)[:, None] >> bit & 1
-    return np.bitwise_xor.reduce(gray[:, None, :] * (_DIRECTIONS << 7 - bit), axis=2) / 256.0
+    points = np.bitwise_xor.reduce(gray[:, None, :] * (_DIRECTIONS << 7 - bit), axis=2)
+    return np.asarray(points / 256.0)
 
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for

@@ -21,7 +21,6 @@ LOADED = (
     "per_obspy.runs.tasks.station",
     "per_obspy.runs.tasks.chunk",
     "per_obspy.runs.tasks.building_rows",
-    "per_obspy.runs.worst_pairs",
     "obspy.taup",
     "obspy.signal.invsim",
     "obspy.signal.trigger",
