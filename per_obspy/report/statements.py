@@ -31,6 +31,7 @@ NO_LEVEL = "#5C5C5C"
 DOUBTS = {
     "assumed_strength": "sure_assumed_strength",
     "beyond_elastic": "sure_beyond_elastic",
+    "unknown_strength": "sure_unknown_strength",
     "derived_inputs": "sure_derived",
     "outside_usable_periods": "sure_periods",
     "far_station": "sure_far",

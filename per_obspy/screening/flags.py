@@ -80,12 +80,13 @@ def elastic_ratios(table: Table) -> dict[str, FloatArray]:
 
 
 def _beyond_elastic(table: Table) -> dict[str, BoolArray]:
-    """Return a mask of pairs with a building beyond HAZUS' yield, in the model or not."""
+    """Return masks of pairs with a building beyond HAZUS' yield, modelled or not, or unknown."""
     ratios = np.stack(both(table, "elastic_ratio"))
     is_linear = np.isinf(np.stack(both(table, "yield_displacement")))
     return {
         "beyond_elastic": np.asarray(((ratios > 1.0) & is_linear).any(axis=0)),
         "assumed_strength": np.asarray(((ratios > 1.0) & ~is_linear).any(axis=0)),
+        "unknown_strength": np.asarray((np.isnan(ratios) & is_linear).any(axis=0)),
     }
 
 

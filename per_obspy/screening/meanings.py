@@ -75,6 +75,10 @@ FLAGS: dict[str, str] = {
         "a building would yield, which is not modelled: its elastic displacement is elastic_ratio "
         "times the yield displacement of HAZUS for its system, storeys and assumed code level"
     ),
+    "unknown_strength": (
+        "the system or height of a building is unknown, and no yield value is given: it is linear, "
+        "so that the pair may rank above those whose buildings yield"
+    ),
     "outside_usable_periods": (
         "a building's period is outside the usable periods of the station's record"
     ),

@@ -32,7 +32,7 @@ PLAIN = {
     "per_2": [0.2, 0.2],
     "sd_1": [0.1, 0.1],
     "sd_2": [0.2, 0.2],
-    "elastic_ratio_1": [np.nan, np.nan],
+    "elastic_ratio_1": [0.5, 0.5],
     "elastic_ratio_2": [1.0, 1.0],
     "yield_displacement_1": [np.inf, np.inf],
     "yield_displacement_2": [np.inf, np.inf],
@@ -94,6 +94,9 @@ def _raised(flags):
         ({"elastic_ratio_2": 1.01, "yield_displacement_2": 0.1}, {"assumed_strength"}),
         ({"elastic_ratio_2": 0.99, "yield_displacement_2": 0.1}, set()),
         ({"elastic_ratio_1": 1.01, "yield_displacement_2": 0.1}, {"beyond_elastic"}),
+        # of unknown system it is linear, unless its strength is given
+        ({"elastic_ratio_1": np.nan}, {"unknown_strength"}),
+        ({"elastic_ratio_1": np.nan, "yield_displacement_1": 0.1}, set()),
     ],
 )
 def test_flags_of_pairs(changes, flags):
