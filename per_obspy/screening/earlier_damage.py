@@ -18,26 +18,15 @@ from per_obspy.inventory.table_columns import numbers_in
 from per_obspy.screening.ranking import STATES
 from per_obspy.screening.values import BoolArray
 
+_OF_BUILDING = (
+    *("longitude", "latitude", "storeys", "period", "sd", "ductility", "participation", "residual"),
+    *("yield_displacement", "hazus_yield", "yield_log_std", "ln_per_std"),
+)
+
 #: Columns of the risk table of the earlier earthquake that are needed, and those it may have.
 NEEDED = (
     *("pair_id", "state", "gap", "gap_std", "derived", "residual_gap"),
-    *(
-        f"{name}_{i}"
-        for name in (
-            *(
-                "longitude",
-                "latitude",
-                "storeys",
-                "period",
-                "sd",
-                "ductility",
-                "participation",
-                "residual",
-            ),
-            *("yield_displacement", "hazus_yield", "yield_log_std", "ln_per_std"),
-        )
-        for i in (1, 2)
-    ),
+    *(f"{name}_{i}" for name in _OF_BUILDING for i in (1, 2)),
 )
 MAY_HAVE = ("gap_before", "after_damage")
 
