@@ -25,7 +25,7 @@ _OF_BUILDING = (
 
 #: Columns of the risk table of the earlier earthquake that are needed, and those it may have.
 NEEDED = (
-    *("pair_id", "state", "gap", "gap_std", "derived", "residual_gap"),
+    *("pair_id", "state", "azimuth", "gap", "gap_std", "derived", "residual_gap"),
     *(f"{name}_{i}" for name in _OF_BUILDING for i in (1, 2)),
 )
 MAY_HAVE = ("gap_before", "after_damage")
@@ -77,7 +77,7 @@ def pairs_after(pairs: pd.DataFrame, earlier: pd.DataFrame, code_level: CodeLeve
     # The gap in the pair table then, and now
     before, gap = _surveyed_gap(rows), numbers_in(pairs, "gap")
     residual = numbers_in(rows, "residual_gap")
-    followed = is_same & np.isfinite(residual) & np.isfinite(before)
+    followed = is_same & _has_residual(rows) & np.isfinite(before)
     # Elastic pairs are as they were
     std, spread = numbers_in(pairs, "gap_std"), _residual_gap_std(rows)
     known = spread <= numbers_in(rows, "gap_std") + SAME_GAP
@@ -106,6 +106,11 @@ def _residual_gap_std(rows: pd.DataFrame) -> FloatArray:
     is_open = numbers_in(rows, "residual_gap") > 0.0
     spread = np.hypot(numbers_in(rows, "gap_std"), np.where(is_open, added, 0.0))
     return np.asarray(np.minimum(spread, LARGEST_STD))
+
+
+def _has_residual(rows: pd.DataFrame) -> BoolArray:
+    """Return which rows have a residual gap along their axis, not along the worst of all."""
+    return np.isfinite(numbers_in(rows, "residual_gap")) & np.isfinite(numbers_in(rows, "azimuth"))
 
 
 def _surveyed_gap(rows: pd.DataFrame) -> FloatArray:

@@ -81,6 +81,7 @@ def elastic_ratios(table: Table) -> dict[str, FloatArray]:
 
 def _beyond_elastic(table: Table) -> dict[str, BoolArray]:
     """Return masks of pairs with a building beyond HAZUS' yield, modelled or not, or unknown."""
+    # NaN where a yield value is given, or where nothing is known
     ratios = np.stack(both(table, "elastic_ratio"))
     is_linear = np.isinf(np.stack(both(table, "yield_displacement")))
     return {
