@@ -230,7 +230,7 @@ def outcomes(rows: pd.DataFrame, sites: Sequence[Site], seed: int) -> NDArray[np
 def _true_pairs(rows: pd.DataFrame, generator: np.random.Generator) -> pd.DataFrame:
     """Draw true periods, dampings and gaps from the table's uncertainties."""
     true = rows.copy()
-    deviates = generator.standard_normal((4, len(rows)))
+    deviates = generator.standard_normal((6, len(rows)))
     # alike neighbours miss a period formula alike
     shared = values(rows, "period_correlation")
     deviates[2] = shared * deviates[0] + np.sqrt(1.0 - shared**2) * deviates[2]
@@ -238,8 +238,13 @@ def _true_pairs(rows: pd.DataFrame, generator: np.random.Generator) -> pd.DataFr
         for number, name in enumerate(("period", "damping"), start=2 * i - 2):
             scatter = values(rows, f"{name}_log_std_{i}") * deviates[number]
             true[f"{name}_{i}"] = values(rows, f"{name}_{i}") * np.exp(scatter)
-        # the strength is what is given: the displacement at yield follows the true period
-        true[f"yield_displacement_{i}"] *= (true[f"period_{i}"] / rows[f"period_{i}"]) ** 2
+        # a given strength is exact: the displacement at yield follows the true period; an assumed
+        # one is that displacement
+        assumed = values(rows, f"yield_log_std_{i}")
+        follows = (true[f"period_{i}"] / rows[f"period_{i}"]) ** 2
+        true[f"yield_displacement_{i}"] *= np.where(
+            assumed > 0.0, np.exp(assumed * deviates[3 + i]), follows
+        )
     spread = values(rows, "gap_std") / np.where(rows["gap"] > 0, rows["gap"], 1.0)
     width = np.sqrt(np.log1p(spread**2))
     true["gap"] *= np.exp(width * generator.standard_normal(len(rows)) - width**2 / 2.0)
