@@ -42,6 +42,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
 from per_obspy.kernels.pairs.node_outcomes import (
     OUTCOME_ROWS,
+    QUANTILE,
     fill_chances,
     fill_outcomes,
     fill_velocities,
@@ -248,6 +249,15 @@ COLUMNS = (
     "expected_amplification",
     *DEMAND_SHARES,
 )
+
+
+def contact_quantile(velocity: FloatArray, log_std: FloatArray) -> FloatArray:
+    """
+    Return the impact velocity, m/s, that 84 in 100 contact laws do not exceed.
+
+    The contact is lognormal with mean 1 about that of the history, and ``log_std`` the deviation.
+    """
+    return velocity * np.exp(log_std * (ndtri(QUANTILE) - log_std / 2.0))
 
 
 def empty_population(count: int) -> Columns:
