@@ -301,7 +301,13 @@ def _at_site(
     at_site = median_at_site(demand, weight, ln_ratio, ln_field)
     # the relative motion has the same frequency at both
     frequency = np.divide(velocity, demand, out=np.zeros_like(demand), where=demand > 0.0)
-    return estimate._replace(demand=at_site, velocity=frequency * at_site)
+    # the more a building yields, the less do alike ones move together
+    weakness = [
+        values(block.table, f"per_{i}") / values(block.table, f"yield_displacement_{i}")
+        for i in (1, 2)
+    ]
+    alike = estimate.correlation / np.maximum(np.fmax(*weakness), 1.0)[:, None]
+    return estimate._replace(demand=at_site, velocity=frequency * at_site, correlation=alike)
 
 
 def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
