@@ -70,6 +70,7 @@ ROWS: tuple[Column, ...] = (
     _number("gap", "m", "clear distance at this interface"),
     _count("impacts", "impacts above 1 mm/s and 1 % of the fastest; empty without a history"),
     _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
+    _number("impact_velocity_84", "m/s", "impact_velocity that 84 in 100 contacts do not exceed"),
     _count(
         "impacts_alone", "impacts of the pair alone, counted as in impacts, under the same motion"
     ),
@@ -131,6 +132,7 @@ BUILDINGS: tuple[Column, ...] = (
         for side in COMPASS
     ),
     _number("impact_velocity", "m/s", "largest approach velocity in the rows of the building"),
+    _number("impact_velocity_84", "m/s", "impact_velocity that 84 in 100 contacts do not exceed"),
     _number("amplification_row", "1", "largest radius in a row / largest radius without contact"),
     _number(
         "amplification_pair",

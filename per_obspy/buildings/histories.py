@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from per_obspy.buildings.contacts import BoolArray, Derived, IntArray
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.row_maxima import BuildingRows, RowMaxima, row_and_pair_maxima
+from per_obspy.screening.population import contact_quantile
 from per_obspy.screening.values import Columns, Table, both, values
 
 #: Relative difference of two descriptions of a building beyond which its row is flagged.
@@ -26,7 +27,7 @@ PROPERTIES = ("period", "damping", "yield_displacement", "hardening")
 
 #: Columns of contacts that :func:`members_of` reads, besides ``turned``.
 NEEDED = (
-    "gap", "restitution", "derived",
+    "gap", "restitution", "contact_log_std", "derived",
     *(f"{name}_{i}" for name in ("contact_mass", "participation", *PROPERTIES) for i in (1, 2)),
 )  # fmt: skip
 
@@ -34,6 +35,7 @@ NEEDED = (
 OUTCOMES = (
     "impacts",
     "impact_velocity",
+    "impact_velocity_84",
     "amplification_left",
     "amplification_right",
     "displacement_left",
@@ -61,12 +63,16 @@ def row_outcomes(
     """
     members = members_of(contacts, first, azimuth)
     row, alone = row_and_pair_maxima(*motion, members.rows)
+    velocity, sizes = row.impact_velocity[members.left], np.diff(first)
+    # Rows depend twice as much on the contact as pairs
+    contact_std = values(contacts, "contact_log_std") * np.where(np.repeat(sizes, sizes) > 1, 2, 1)
     # Both buildings of each contact
     left, right = members.left, members.right
     amplification, of_pair = _amplification(row), _amplification(alone)[left]
     return {
         "impacts": row.impacts[left].astype(np.float64),
-        "impact_velocity": row.impact_velocity[left],
+        "impact_velocity": velocity,
+        "impact_velocity_84": contact_quantile(velocity, contact_std),
         "amplification_left": amplification[left],
         "amplification_right": amplification[right],
         "displacement_left": row.displacement[left],

@@ -202,6 +202,7 @@ def _hits(sides: Sides) -> dict[str, FloatArray | NDArray[np.int64]]:
         columns[f"impacts_{side}"] = sides.sum(here)
     return columns | {
         "impact_velocity": sides.largest(velocity),
+        "impact_velocity_84": sides.largest(sides["impact_velocity_84"]),
         "amplification_row": sides.largest(sides["amplification"]),
         "amplification_pair": sides.largest(sides["amplification_alone"]),
     }

@@ -48,7 +48,8 @@ RANKED = 50_000
 #: Columns of the rows that a side of a building needs.
 _OF_ROWS = (
     "row_id", "buildings", "interface", "pair_id", "turned", "azimuth", "impacts",
-    "impact_velocity", "impact_velocity_alone", "flags", "longitude", "latitude",
+    "impact_velocity", "impact_velocity_84", "impact_velocity_alone", "flags",
+    "longitude", "latitude",
     *(f"{name}_{side}" for side in ("left", "right")
       for name in ("building_id", "building_number", "amplification", "amplification_alone")),
 )  # fmt: skip

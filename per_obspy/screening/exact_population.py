@@ -26,11 +26,9 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
-from per_obspy.kernels.pairs.node_outcomes import QUANTILE
 from per_obspy.screening.estimates import ROUND_OFF
 from per_obspy.screening.exact import (
     can_yield,
@@ -46,6 +44,7 @@ from per_obspy.screening.population import (
     UncertainMotion,
     building_is_uncertain,
     chance_of_contact,
+    contact_quantile,
     damping_at_nodes,
     empty_population,
     estimated_motion,
@@ -211,10 +210,9 @@ def _of_certain_buildings(block: _Block) -> Columns:
     certain = at_record & (gap_dispersion(table) == 0.0)
     velocity = np.nan_to_num(values(table, "impact_velocity_exact"))
     amplified = np.fmax(*both(table, "amplification_exact"))
-    contact_std = values(table, "contact_log_std")
     history = {
         "expected_impact_velocity": velocity,
-        "impact_velocity_84": velocity * np.exp(contact_std * (ndtri(QUANTILE) - contact_std / 2)),
+        "impact_velocity_84": contact_quantile(velocity, values(table, "contact_log_std")),
         "expected_amplification": np.where(velocity > 0.0, np.fmax(amplified, 1.0), 1.0),
     }
     return result | {name: np.where(certain, history[name], result[name]) for name in history}
@@ -303,7 +301,13 @@ def _at_site(
     at_site = median_at_site(demand, weight, ln_ratio, ln_field)
     # the relative motion has the same frequency at both
     frequency = np.divide(velocity, demand, out=np.zeros_like(demand), where=demand > 0.0)
-    return estimate._replace(demand=at_site, velocity=frequency * at_site)
+    # the more a building yields, the less do alike ones move together
+    weakness = [
+        values(block.table, f"per_{i}") / values(block.table, f"yield_displacement_{i}")
+        for i in (1, 2)
+    ]
+    alike = estimate.correlation / np.maximum(np.fmax(*weakness), 1.0)[:, None]
+    return estimate._replace(demand=at_site, velocity=frequency * at_site, correlation=alike)
 
 
 def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:

@@ -19,9 +19,10 @@ alike, so that a row does not depend on the other pairs.
 Two oscillators whose relative displacement would reach D and whose relative velocity V hit at a gap
 g with ``V sqrt(1 - (g/D)²)`` if their relative motion were harmonic. Earlier impacts keep nearly
 equal oscillators from building up a relative motion at all: the velocity is less by the factor
-``exp(-(LOSS sqrt(rho) + LOSS_BETWEEN rho (1 - rho)) (1 - g/D))`` with rho of eq. (16). The change
+``exp(-(LOSS sqrt(rho) + LOSS_BETWEEN rho (1 - rho)) (1 - g/D))`` with rho of eq. (16), over the
+larger ratio of PER to the yield displacement where a building yields in a record. The change
 of velocity dv of eq. (7) and (8), x being dv / (w r), amplifies a radius r by
-``(1 + (RADIUS_SHARE x)⁴)^(1/4) + WEAK_SHARE sqrt(x)``. The constants are those of
+``(1 + (RADIUS_SHARE x)⁴)^(1/4) + WEAK_SHARE sqrt(x (1 - g/D))``. The constants are those of
 ``kernels/pairs/node_outcomes.py``, fitted to exact histories in 10 events of real records;
 ``workflows/population_accuracy.py`` has their accuracy.
 
@@ -42,6 +43,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
 from per_obspy.kernels.pairs.node_outcomes import (
     OUTCOME_ROWS,
+    QUANTILE,
     fill_chances,
     fill_outcomes,
     fill_velocities,
@@ -248,6 +250,15 @@ COLUMNS = (
     "expected_amplification",
     *DEMAND_SHARES,
 )
+
+
+def contact_quantile(velocity: FloatArray, log_std: FloatArray) -> FloatArray:
+    """
+    Return the impact velocity, m/s, that 84 in 100 contact laws do not exceed.
+
+    The contact is lognormal with mean 1 about that of the history, and ``log_std`` the deviation.
+    """
+    return velocity * np.exp(log_std * (ndtri(QUANTILE) - log_std / 2.0))
 
 
 def empty_population(count: int) -> Columns:

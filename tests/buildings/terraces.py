@@ -25,6 +25,7 @@ def contacts(count, seed=5, **columns):
     table = {
         "gap": generator.uniform(0.0, 0.02, count),
         "restitution": generator.uniform(0.4, 0.8, count),
+        "contact_log_std": np.where(np.arange(count) % 2, 0.0, 0.1),
         "derived": np.full(count, "", dtype=object),
         "turned": np.zeros(count, dtype=bool),
         "period_1": period[:-1],

@@ -97,6 +97,16 @@ def test_equal_buildings_in_touch_never_hit_each_other():
     np.testing.assert_allclose(found["amplification_left"], 1.0, rtol=1e-9)
 
 
+def test_a_row_depends_twice_as_much_on_the_contact_as_a_pair():
+    table = contacts(4)
+    row, pairs = outcomes(table), outcomes(table, first=np.arange(5))
+    # lognormal with mean 1: deviations 0.2 and 0.1; 0.99446 is the 84 % point of a normal variable
+    for found, deviation in ((row, 0.2), (pairs, 0.1)):
+        ratio = found["impact_velocity_84"] / found["impact_velocity"]
+        expected = np.exp(deviation * 0.99446 - deviation**2 / 2)
+        np.testing.assert_allclose(ratio, [expected, 1.0, expected, 1.0], rtol=1e-5)
+
+
 def test_wide_gaps_keep_a_row_apart():
     found = outcomes(contacts(4, gap=np.full(4, 5.0)))
     assert (found["impacts"] == 0).all()

@@ -45,6 +45,7 @@ def interfaces(**columns):
             "gap": 0.1,
             "impacts": [3.0, 0.0, 2.0],
             "impact_velocity": [0.3, 0.0, 0.1],
+            "impact_velocity_84": [0.36, 0.0, 0.11],
             "impacts_alone": [1.0, 0.0, 2.0],
             "impact_velocity_alone": [0.1, 0.0, 0.1],
             "flags": ["", "fork", ""],

@@ -101,6 +101,13 @@ def test_a_row_of_two_is_the_pair_of_the_risk_table(finished):
     np.testing.assert_allclose(
         two["impact_velocity"], two["impact_velocity_exact"], rtol=1e-6, atol=1e-12
     )
+    # buildings carry the largest quantile of both sides
+    sides = pd.concat(
+        [rows.set_index(f"building_id_{side}")["impact_velocity_84"] for side in ("left", "right")]
+    )
+    quantiles = table(folder, "buildings").set_index("building_id")["impact_velocity_84"]
+    largest = sides.groupby(level=0).max().loc[quantiles.index]
+    np.testing.assert_array_equal(quantiles, largest)
 
 
 def test_totals_count_every_building_once(finished):

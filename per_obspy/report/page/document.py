@@ -79,7 +79,8 @@ HIDDEN = (
 BUILDING_KINDS = {
     "rank": "whole", "building_id": "text", "probability_common": "chance",
     "neighbours": "whole", "neighbours_that_can_hit": "whole", "impacts": "whole",
-    "impact_velocity": "number", "position": "choice", "prevention": "names",
+    "impact_velocity": "number", "impact_velocity_84": "number", "position": "choice",
+    "prevention": "names",
 }  # fmt: skip
 
 #: Columns of the tables further down.

@@ -94,7 +94,7 @@ class Page {
       rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
       hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.percent(column.probability_common[i]),
     })];
-    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(column.impact_velocity[i]) }));
+    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(column.impact_velocity[i]), high: this.number(column.impact_velocity_84?.[i]) }));
     const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
     if (prevention) said.push(this.t("building_prevention", { value: prevention }));
     return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
