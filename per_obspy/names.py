@@ -1,4 +1,8 @@
-"""Names from data: codes of stations, paths that must lie in their folder, public addresses."""
+"""
+Names from data: codes of stations, paths that must lie in their folder, public addresses.
+
+And numbers of things in words.
+"""
 
 import re
 from pathlib import Path
@@ -22,6 +26,18 @@ _LONGEST_NAME, _LONGEST_PATH = 255, 1024
 
 #: Control characters, folders of Windows, or a drive of Windows at the start.
 _UNPORTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\\]|^[A-Za-z]:")
+
+
+def number_of(count: int, thing: str) -> str:
+    """
+    Return a number of things in words.
+
+    Examples
+    --------
+    >>> number_of(1, "pair"), number_of(0, "pair")
+    ('1 pair', '0 pairs')
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
 def code_problem(*codes: str) -> str:

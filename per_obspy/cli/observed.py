@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from per_obspy.cli.printing import named_path, output_option
+from per_obspy.names import number_of
 
 
 def observed(
@@ -34,7 +35,7 @@ def observed(
     # Answers first, then how good the prediction was
     seen = found.pairs["observed"]
     print(
-        f"{len(found.pairs)} pairs seen: {int((seen == 1).sum())} hit each other, "
+        f"{number_of(len(found.pairs), 'pair')} seen: {int((seen == 1).sum())} hit each other, "
         f"{int((seen == 0).sum())} did not, {int(seen.isna().sum())} unsure or not said; "
         f"{found.empty} forms empty, {len(found.rejected)} rejected or in conflict"
     )

@@ -17,6 +17,7 @@ from per_obspy.cli.printing import (
     stop_if_nothing,
 )
 from per_obspy.errors import CatalogError, printable, require_extra
+from per_obspy.names import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -271,7 +272,9 @@ def _print_footprint_pairs(
         print(json.dumps({**places, **counts, **of_search, **of_raster, **of_licence}))
         return
     print(printable(search_sentence(search, "en")))
-    counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
+    counted = (
+        f"{number_of(len(table), 'pair')}, {touching} of them touching, {len(rejected)} rejected"
+    )
     print(f"{counted}: {output}")
     # Further files and assumptions
     print(f"  outlines and columns of all buildings: {buildings}")
@@ -460,7 +463,9 @@ def add(
 
     today = datetime.datetime.now(datetime.UTC).date()
     entry = add_inventory(index, file, Origin(name, source, licence, today))
-    print(f"{entry.name}: {entry.pairs} pairs, sha256 {entry.sha256}, entered in {index}")
+    print(
+        f"{entry.name}: {number_of(entry.pairs, 'pair')}, sha256 {entry.sha256}, entered in {index}"
+    )
 
 
 @catalog.command("list")

@@ -37,6 +37,13 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
     Console(width=None if sys.stdout.isatty() else 120).print(table)
 
 
+def print_worst(columns: "Sequence[str]", rows: "Sequence[Sequence[object]]") -> None:
+    """Print the worst pairs as a table, nothing without a pair."""
+    if rows:
+        title = "The worst pair" if len(rows) == 1 else f"The {len(rows)} worst pairs"
+        print_table(title, columns, rows)
+
+
 def state_texts(counts: "Mapping[str, int]") -> list[str]:
     """Return one text per state with its number of pairs; unknown gaps only if there are any."""
     from per_obspy.config.screening import EVERY_STATE, UNKNOWN_STATE

@@ -18,7 +18,7 @@ from per_obspy.cli.printing import (
     percent,
     print_and_end,
     print_files,
-    print_table,
+    print_worst,
     shown_progress,
     state_texts,
     stop_if_nothing,
@@ -32,6 +32,7 @@ from per_obspy.cli.watch import (
     logged,
 )
 from per_obspy.errors import printable
+from per_obspy.names import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -252,7 +253,7 @@ def _print_stations(
         rows = [rejection._asdict() for rejection in rejected]
         print(json.dumps({"stations": stations, "rejected": rows, "files": files}))
     else:
-        counts = f"{stations} stations, {len(rejected)} rejected"
+        counts = f"{number_of(stations, 'station')}, {len(rejected)} rejected"
         print(counts, reasons, *files, sep="\n  ")
     stop_if_nothing(stations)
 
@@ -298,7 +299,9 @@ def process(
         counts = {"stations": stations, "resumed": resumed}
         print(json.dumps({**counts, "rejected": rows, "files": files}))
     elif not quiet:
-        print(f"{stations} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
+        print(
+            f"{number_of(stations, 'station')}, {len(result.rejected)} rejected", *files, sep="\n  "
+        )
     stop_if_nothing(stations)
 
 
@@ -336,13 +339,17 @@ def _print_counts(record: dict[str, Any]) -> None:
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     alone = counts.get("stations_amplitudes_only", 0)
     others = f" and {alone} with amplitudes only" if alone else ""
-    stations = f"{counts['stations']} stations{others}"
-    print(f"{stations}, {counts['pairs']} pairs: {states}; {rejected} rejected")
-    # What an earlier earthquake left, and people
+    stations = f"{number_of(counts['stations'], 'station')}{others}"
+    print(f"{stations}, {number_of(counts['pairs'], 'pair')}: {states}; {rejected} rejected")
+    _print_apart(counts)
+
+
+def _print_apart(counts: "Mapping[str, int]") -> None:
+    """Print what an earlier earthquake left, and what people reported, where there is any."""
     if "after_damage_unknown" in counts:
         left, unknown = counts["after_damage_residual"], counts["after_damage_unknown"]
-        line = f"{left} pairs start from the gap that the earlier earthquake left"
-        print(f"{line}; the damage of {unknown} is unknown")
+        line = f"after the earlier earthquake: {number_of(left, 'pair')} with the gap that it left"
+        print(f"{line}, {unknown} of unknown damage")
     if people := counts.get("intensities_left_out", 0):
         print(f"{people} intensities that people reported are left out")
 
@@ -410,11 +417,13 @@ def _left_out_lines(screened: dict[str, Any], groups: "Sequence[dict[str, Any]]"
     clocks = [group for group in groups if group.get("joined_by")]
     if apart:
         others = ", ".join(group["start"] for group in apart)
-        facts = f"{screened['stations']} stations; others, left out: {others}"
+        facts = f"{number_of(screened['stations'], 'station')}; others, left out: {others}"
         lines.append(f"Records of {len(apart) + 1} earthquakes: {screened['start']}, {facts}")
     # Both may be true of one folder
     if clocks:
-        starts = ", ".join(f"{group['start']} ({group['stations']} stations)" for group in clocks)
+        starts = ", ".join(
+            f"{group['start']} ({number_of(group['stations'], 'station')})" for group in clocks
+        )
         lines.append(
             f"Screened: records from {screened['start']}, {screened['stations']} stations. Not "
             f"used: {starts}: another earthquake, or the same by clocks that differ, as no station "
@@ -442,7 +451,7 @@ def _print_worst(folder: Path, count: int) -> None:
     """Print the worst pairs as a table."""
     titles = list(SHOWN.values())
     worst = [tuple(map(_said, SHOWN, row)) for row in _worst_rows(folder, list(SHOWN), count)]
-    print_table(f"The {len(worst)} worst pairs", titles, worst)
+    print_worst(titles, worst)
     print(
         "Ranked by impact, doubled where floors meet columns, half as much again where a tall "
         "building stands beside a low one."

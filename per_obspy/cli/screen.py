@@ -16,7 +16,7 @@ from per_obspy.cli.printing import (
     percent,
     print_and_end,
     print_files,
-    print_table,
+    print_worst,
     state_texts,
     stop_if_nothing,
     why_nothing,
@@ -31,6 +31,7 @@ from per_obspy.cli.watch import (
     logged,
 )
 from per_obspy.errors import CatalogError, printable
+from per_obspy.names import number_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,6 +183,8 @@ def _spectrum_table(
     # Without a hazard nothing is scaled
     if settings.shape is not None:
         raise CatalogError(str(configuration), "shape: spectrum is no hazard curve that needs one")
+    if "target_rate" in settings.model_fields_set:
+        raise CatalogError(str(configuration), "target_rate: spectrum is no hazard with rates")
     return design_table(read_design_spectrum(settings.spectrum), pairs, *given)
 
 
@@ -245,7 +248,7 @@ def _print_spectrum_result(
     """Print counts, worst pairs and files of a screening by a spectrum."""
     words = ", ".join(state_texts(counts))
     print(
-        f"{len(table)} pairs ({words}), {rejected} rejected; "
+        f"{number_of(len(table), 'pair')} ({words}), {rejected} rejected; "
         "the radius is SD, a design spectrum has no PER"
     )
     # A hazard has its own gap
@@ -268,7 +271,7 @@ def _print_ensemble(result: "Result") -> None:
     print_coverage(record)
     counts = record["counts"]
     print(
-        f"{len(record['scenarios'])} scenarios, {counts['pairs']} pairs; "
+        f"{number_of(len(record['scenarios']), 'scenario')}, {number_of(counts['pairs'], 'pair')}; "
         f"{counts['rejected_pair']} rejected; without a probability: {counts['unknown_gap']} of "
         f"unknown gap, {counts['missing_scenario']} that a scenario lacks"
     )
@@ -295,4 +298,4 @@ def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") 
     units = {name: column.unit for name in columns if (column := known_column(name))}
     titles = list(column_aliases(columns, units | dict.fromkeys(chances, "%")).values())
     rows = shown.itertuples(index=False)
-    print_table(f"The {len(worst)} worst pairs", titles, rows)
+    print_worst(titles, [*rows])

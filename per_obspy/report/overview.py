@@ -30,7 +30,7 @@ from per_obspy.report.style import (
     title_name,
 )
 from per_obspy.report.texts import LANGUAGES, counted, written
-from per_obspy.screening.ranking import UNKNOWN_CLASS
+from per_obspy.screening.ranking import NO_VERDICT, UNKNOWN_CLASS
 
 IntArray = NDArray[np.int64]
 
@@ -247,7 +247,8 @@ def worst_places(table: pd.DataFrame, region: Region) -> list[tuple[Frame, IntAr
     if east.size < FEWEST or _whole_frame(points, region).size < STREETS:
         return []
     # Pairs that are not yet in a place
-    mildest = [region.classes[-1], UNKNOWN_CLASS]
+    without = [UNKNOWN_CLASS, NO_VERDICT]
+    mildest = [*[name for name in region.classes if name not in without][-1:], *without]
     rest = ~table["risk_class"].isin(mildest).to_numpy()
     while rest.any() and len(places) < SHOWN_PLACES:
         worst = int(np.argmax(rest))

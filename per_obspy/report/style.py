@@ -10,14 +10,14 @@ from matplotlib.figure import Figure, SubFigure
 
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
-from per_obspy.screening.ranking import UNKNOWN_CLASS
+from per_obspy.screening.ranking import NO_VERDICT, UNKNOWN_CLASS
 
 #: Colours of severity, the worst first. Dark red to pale orange for what is to be inspected, blue
 #: for the mildest class: no class is green, because none is a promise of safety. Neighbours differ
 #: for colour-blind readers too, see the test.
 SEVERITY_COLOURS = ("#7F0000", "#D7301F", "#FC8D59", "#FDD08E", "#A6BFD8")
 
-#: Pairs whose gap is unknown: not a severity.
+#: Pairs whose gap is unknown, or without a verdict: not a severity.
 UNKNOWN_COLOUR = "#7A5FA8"
 
 #: Marks in figures of records, which have no severity (Okabe & Ito 2008).
@@ -45,13 +45,16 @@ def class_colours(classes: Sequence[str]) -> dict[str, str]:
     Parameters
     ----------
     classes : sequence of str
-        Names of the risk classes, worst first; pairs of unknown gap are added as a class.
+        Names of the risk classes, worst first, and last perhaps that of pairs without a verdict;
+        pairs of unknown gap are added as a class.
 
     Examples
     --------
     >>> class_colours(["severe", "low"])
     {'severe': '#7F0000', 'low': '#A6BFD8', 'gap unknown': '#7A5FA8'}
     """
+    without = dict.fromkeys([UNKNOWN_CLASS, *({NO_VERDICT} & {*classes})], UNKNOWN_COLOUR)
+    classes = [name for name in classes if name not in without]
     known, last = SEVERITY_COLOURS, max(len(classes) - 1, 1)
     if len(classes) > len(known):
         ramp = LinearSegmentedColormap.from_list("risk", list(known))
@@ -61,7 +64,7 @@ def class_colours(classes: Sequence[str]) -> dict[str, str]:
         steps = (number * (len(known) - 1) // last for number in range(len(classes)))
         chosen = [known[step] for step in steps]
     colours = dict(zip(classes, chosen, strict=True))
-    return colours | {UNKNOWN_CLASS: UNKNOWN_COLOUR}
+    return colours | without
 
 
 def title_name(name: str) -> str:

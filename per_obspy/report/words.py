@@ -13,7 +13,7 @@ from per_obspy.errors import shortened
 from per_obspy.inventory.places import with_towns
 from per_obspy.report.texts import LANGUAGES, marks
 from per_obspy.screening.meanings import DEMAND_RULES, FLAGS
-from per_obspy.screening.ranking import UNKNOWN_CLASS, UNKNOWN_STATE
+from per_obspy.screening.ranking import NO_VERDICT, UNKNOWN_CLASS, UNKNOWN_STATE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -176,11 +176,13 @@ def _text(pair: Mapping[str, Any], name: str) -> str:
 def _verdict(pair: Mapping[str, Any]) -> list[str]:
     """Return the sentence on whether the pair pounds."""
     state = STATE_WORDS.get(_text(pair, "state"), "has been screened")
+    # Its gap may be known
+    state = "has no verdict" if _text(pair, "risk_class") == NO_VERDICT else state
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
     # Why a pair without a verdict has a rank
-    if _text(pair, "state") == UNKNOWN_STATE:
+    if _text(pair, "state") == UNKNOWN_STATE and not _text(pair, "worst_scenario"):
         lines.append(RANKED_BY_NEED)
     # A run has one probability, an ensemble perhaps that of a year too
     if math.isfinite(number(pair, "probability")):

@@ -50,6 +50,7 @@ from per_obspy.screening.columns import HAZARD, known_column
 from per_obspy.screening.design import DESIGN
 from per_obspy.screening.ensemble import ensemble_columns
 from per_obspy.screening.ranking import (
+    NO_VERDICT,
     UNKNOWN_CLASS,
     UNKNOWN_STATE,
     pounding_state,
@@ -346,7 +347,7 @@ def report_ensemble(
         return report
     # The scenarios replace the earthquake
     limits, language = ScreeningSettings(), settings.report.language
-    texts, classes, stations = LANGUAGES[language], list(limits.classes), runs.stations()
+    texts, classes, stations = LANGUAGES[language], [*limits.classes, NO_VERDICT], runs.stations()
     region = _region(settings.name, classes, simulated, stations)
     _store_histories(runs, table, folder / WORST_PAIRS, report)
     results = Results(
@@ -408,9 +409,10 @@ def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFram
     # Without a probability there is neither
     unknown, flags = np.isnan(chance), piece.get("flags", pd.Series("", piece.index))
     lacks = pd.Series(unknown & piece["gap"].notna(), piece.index)
+    severity = risk_class(velocity, limits.classes)
     no_class = unknown | flags.str.contains("unknown_gap").to_numpy(bool)
     return piece.assign(
         state=np.where(unknown, UNKNOWN_STATE, pounding_state(chance, limits.states)),
-        risk_class=np.where(no_class, UNKNOWN_CLASS, risk_class(velocity, limits.classes)),
+        risk_class=np.where(lacks, NO_VERDICT, np.where(no_class, UNKNOWN_CLASS, severity)),
         flags=flags.where(~lacks, (flags + " missing_scenario").str.strip()),
     )

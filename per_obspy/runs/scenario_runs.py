@@ -23,7 +23,8 @@ from per_obspy.runs.worst_pairs import HISTORIES, HISTORY_COLUMNS, pair_historie
 OF_BUILDINGS = (
     "building_id_1", "building_id_2", "longitude_1", "latitude_1", "longitude_2", "latitude_2",
     "height_1", "height_2", "storeys_1", "storeys_2", "period_1", "period_2", "damping_1",
-    "damping_2", "period_log_std_1", "period_log_std_2", "derived",
+    "damping_2", "period_log_std_1", "period_log_std_2", "yield_displacement_1",
+    "yield_displacement_2", "derived",
 )  # fmt: skip
 
 #: Flags that do not depend on the motion.

@@ -228,7 +228,8 @@ def _intensities(path: Path, names: Sequence[str]) -> FloatArray:
 
 def _chances(path: Path, places: pd.DataFrame, chance: FloatArray) -> FloatArray:
     """Check and return probabilities of rising intensities."""
-    _require(path, ((chance >= 0.0) & (chance <= 1.0)).all(axis=1), "a probability is not 0 to 1")
+    within = ((chance >= 0.0) & (chance <= 1.0)).all(axis=1)
+    _require(path, within, "a probability is missing or not 0 to 1")
     falls = (np.diff(chance, axis=1) <= 0.0).all(axis=1)
     _require(path, falls, "the probability grows with the intensity")
     # Of several curves of one place chance would take one

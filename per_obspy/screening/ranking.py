@@ -230,6 +230,9 @@ APART = 1000.0
 #: Risk class of every pair whose gap is unknown, assumed or not.
 UNKNOWN_CLASS = "gap unknown"
 
+#: Risk class of pairs of an ensemble that a scenario lacks.
+NO_VERDICT = "no verdict"
+
 #: Columns of truth values that :func:`kept_apart` adds and :func:`without_gap` drops.
 MARKS = ("unknown_gap", "assumed_gap")
 

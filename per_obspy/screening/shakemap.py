@@ -222,6 +222,8 @@ def mapped_rows(
     table = table.assign(flags=joined_flags(raised_by_pairs(table) | dict(raised)))
     # columns of a risk table that need a record are empty, and without those of SD alone
     lacking = [name for name in ORDER if name not in table and name != "rank"]
-    table = table.assign(**{n: "" if RESULTS[n].dtype == "str" else np.nan for n in lacking})
+    empty = {name: "" if RESULTS[name].dtype == "str" else np.nan for name in lacking}
+    # Joined at once: pandas warns of many columns added one by one
+    table = pd.concat([table, pd.DataFrame(empty, table.index)], axis=1).copy()
     own = ["squares_decide", "srss_gap_sd", "absolute_gap_sd", ODD]
     return table.drop(columns=own, errors="ignore")

@@ -93,9 +93,9 @@ def test_help_loads_nothing_heavy():
 def test_a_run_prints_the_worst_pairs_and_where_everything_is(call, configuration):
     code, out, err = call("run", configuration)
     assert code == 0
-    assert "1 pairs" in out
+    assert "1 pair" in out
     assert "looked at" not in out
-    assert "The 1 worst pairs" in out
+    assert "The worst pair" in out
     assert "risk.csv" in out
     assert "stations: 2 of 2" in err  # plain lines, because nobody watches
 

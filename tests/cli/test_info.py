@@ -116,7 +116,7 @@ def test_info_shows_earthquakes_and_simulated_records(simulation, tmp_path, call
     assert all(record["simulated"] for record in records)
     out = call("info", tmp_path)[1]
     assert re.search(r"earthquake 1 +\S+T\d\d:\d\d: 2 stations, 6 records", out)
-    assert re.search(r"earthquake 2 +2001-02-03T04:04: 1 stations, 3 records", out)
+    assert re.search(r"earthquake 2 +2001-02-03T04:04: 1 station, 3 records", out)
     assert "9 records are SIMULATED." in out
 
 

@@ -126,7 +126,7 @@ def test_a_list_of_buildings_makes_pairs(call, tmp_path):
     (tmp_path / "list.csv").write_text("\n".join(rows))
     code, out, _ = call("pairs", tmp_path / "list.csv", "-o", tmp_path / "p.csv")
     assert code == 0
-    assert "1 pairs, 0 of them touching, 0 rejected" in out
+    assert "1 pair, 0 of them touching, 0 rejected" in out
 
 
 def test_wrong_footprints_stop_with_one_line(call, tmp_path):

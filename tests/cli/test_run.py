@@ -28,7 +28,7 @@ def test_records_and_pairs_are_a_run(records, tmp_path, monkeypatch, call):
     folder = tmp_path / "results" / f"{records.name}-town"
     line = f"records: {records} (folder); pairs: town.csv (pair table); results: {folder}"
     assert err.splitlines()[0] == line.replace(f"{tmp_path}/", "")
-    assert "2 stations, 1 pairs" in out
+    assert "2 stations, 1 pair:" in out
     assert f"per-obspy run {folder / 'configuration.toml'} does it again." in out
     # The last lines are the files to open, which are there
     assert "Open in this order:" in out.splitlines()[-4]

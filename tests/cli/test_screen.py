@@ -33,7 +33,7 @@ def screened(call, tmp_path):
 def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     code, out, _ = screened()
     assert code == 0
-    assert "1 pairs (1 yes, 0 likely, 0 possible, 0 unlikely, 0 no), 1 rejected" in out
+    assert "1 pair (1 yes, 0 likely, 0 possible, 0 unlikely, 0 no), 1 rejected" in out
     table = pd.read_csv(tmp_path / "out" / "design.csv")
     described = pd.read_csv(tmp_path / "out" / "design.columns.csv").set_index("name")
     whole, columns = pd.read_parquet(tmp_path / "out" / "design.parquet"), described["meaning"]
@@ -105,6 +105,14 @@ def test_a_wrong_spectrum_stops_with_one_line(screened, tmp_path):
     assert code == 2
     assert err.count("\n") == 1
     assert "code.csv: psa = 980 m/s2 in row 1: in other units?" in err
+
+
+def test_a_rate_of_a_spectrum_without_rates_is_refused(screened, tmp_path):
+    settings = tmp_path / "design.toml"
+    settings.write_text("target_rate = 0.01\n" + settings.read_text())
+    code, _, err = screened()
+    assert code == 2
+    assert "design.toml: target_rate: spectrum is no hazard" in err
 
 
 def test_nothing_inside_the_spectrum_exits_with_3(screened, tmp_path):

@@ -4,7 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from per_obspy.report.words import chance_text, length_text, pair_lines, speed_text
+from per_obspy.report.words import (
+    RANKED_BY_NEED,
+    chance_text,
+    length_text,
+    pair_lines,
+    speed_text,
+)
+from per_obspy.screening.ranking import NO_VERDICT
 
 PAIR = {
     "pair_id": "P7",
@@ -117,6 +124,15 @@ def test_none_needed_is_said_only_of_what_was_computed_and_stays_apart(pair, exp
 def test_hostile_names_are_short_and_on_one_line(name):
     lines = pair_lines(PAIR | {"pair_id": name, "flags": name, "building_id_1": name})
     assert all(len(line) < 500 and line.isprintable() for line in lines)
+
+
+def test_a_pair_that_a_scenario_lacks_has_a_gap_and_no_verdict():
+    pair = {"pair_id": "P7", "gap": 0.04, "rank": 3, "state": "unknown", "worst_scenario": "near"}
+    lines = pair_lines(pair | {"risk_class": NO_VERDICT, "probability_far": np.nan})
+    # would catch a known gap that is called unknown, and a rank with two reasons
+    assert lines[:2] == ["Pair P7 has no verdict.", "Class no verdict, rank 3."]
+    assert "It has no result in far, and is ranked by the other scenarios." in lines
+    assert not any("unknown" in line or RANKED_BY_NEED in line for line in lines[:5])
 
 
 def test_certainty_is_not_rounded_up():

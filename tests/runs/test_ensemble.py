@@ -172,6 +172,10 @@ def test_pairs_of_unknown_gap_or_of_one_scenario_are_ranked_and_shown(copied, ca
     assert columns["state"]["texts"] == ["unknown"]
     assert {"unknown_gap", "missing_scenario"} <= set(" ".join(columns["flags"]["texts"]).split())
     assert "longitude_2" in columns
+    # of the two that a scenario lacks the gap is known
+    assert set(columns["risk_class"]["texts"]) == {"gap unknown", "no verdict"}
+    totals = pd.read_csv(copied / "both" / "totals.csv")
+    assert totals[["class_gap unknown", "class_no verdict"]].sum().tolist() == [1, 2]
 
 
 def test_nothing_usable_in_a_scenario_exits_with_3(copied, capsys):

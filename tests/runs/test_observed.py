@@ -165,6 +165,6 @@ def test_the_command_prints_counts_rates_and_files(results, forms, tmp_path, cal
     fill(forms, 1, contact="yes")
     code, out, _ = call("observed", results, forms, "-o", tmp_path / "seen")
     assert code == 0
-    assert out.startswith("1 pairs seen: 1 hit each other, 0 did not")
+    assert out.startswith("1 pair seen: 1 hit each other, 0 did not")
     assert "59 forms empty" in out
     assert "chosen for a visit" in out

@@ -512,12 +512,18 @@ def test_an_aftershock_starts_from_the_results_of_the_main_shock(copied):
 
 
 @pytest.mark.parametrize(
-    ("after", "problem"), [("out", "of this run itself"), ("nowhere", "no finished run")]
+    ("after", "problem"),
+    [("out", "of this run itself"), ("nowhere", "no finished run"), ("cut", "damaged")],
 )
 def test_a_run_starts_from_finished_results_of_another(copied, after, problem):
     configuration = copied / "run.toml"
     configuration.write_text(f'after = "{after}"\n{configuration.read_text()}')
-    with pytest.raises(CatalogError, match=f"{after}: after: .*{problem}"):
+    # one whose table is cut off
+    (copied / "cut").mkdir()
+    (copied / "cut" / "run.json").write_bytes((copied / "out" / "run.json").read_bytes())
+    table = (copied / "out" / "risk.parquet").read_bytes()
+    (copied / "cut" / "risk.parquet").write_bytes(table[:3000])
+    with pytest.raises(CatalogError, match=f"{after}.*: after: .*{problem}"):
         screen(configuration, executor=InProcess())
 
 

@@ -272,8 +272,8 @@ SECOND = "c/hazard_curve-mean-SA(1.0)_12.csv"
             "kind='rlz-001'",
             "one measure is no",
         ),
-        (SECOND, ",1.0,", ",nan,", "site 1: a probability is not 0"),
-        (SECOND, ",1.0,", ",1.5,", "site 1: a probability is not 0"),
+        (SECOND, ",1.0,", ",nan,", "site 1: a probability is missing or not 0"),
+        (SECOND, ",1.0,", ",1.5,", "site 1: a probability is missing or not 0"),
         (SECOND, ",1.0,", ",0.5,", "site 1: the probability grows"),
         (SECOND, "poe-0.0", "poe--0.0", "needs two intensities"),
         (

@@ -11,6 +11,7 @@ from per_obspy.errors import printable
 from per_obspy.files import written_whole
 from per_obspy.report.layers.inspections import QUESTIONS, add_form
 from per_obspy.report.style import class_colours
+from per_obspy.screening.ranking import NO_VERDICT
 
 #: First line of the XML files of QGIS.
 DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
@@ -133,12 +134,12 @@ def _document(root: ElementTree.Element, geometry: str, aliases: Mapping[str, st
 
 
 def _add_categories(renderer: ElementTree.Element, classes: Sequence[str], geometry: str) -> None:
-    """Add a category and its symbol for each risk class, and for pairs of unknown gap."""
+    """Add a category and its symbol for each risk class and for pairs without one."""
     categories = ElementTree.SubElement(renderer, "categories")
     symbols = ElementTree.SubElement(renderer, "symbols")
     for number, (name, colour) in enumerate(class_colours(classes).items()):
         # Size changes evenly from the worst to the mildest class
-        share = min(number / max(len(classes) - 1, 1), 1.0)
+        share = min(number / max(len(classes) - 1 - (NO_VERDICT in classes), 1), 1.0)
         size = LARGEST + share * (SMALLEST - LARGEST)
         facts = {"value": printable(name), "label": printable(name)}
         facts |= {"symbol": str(number), "render": "true"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from per_obspy.errors import CatalogError, Rejection, require_extra
+from per_obspy.names import number_of
 from per_obspy.runs.inputs.input_kinds import PAIR_KINDS, Kind, files_in, kind_of, records_place
 
 if TYPE_CHECKING:
@@ -124,7 +125,8 @@ def _of_records(records: "Sequence[RecordInfo]", rejected: Sequence[Rejection]) 
     rows = [record._asdict() for record in records]
     return Description(
         Kind.RECORDS,
-        f"{len(records)} records of {len(stations)} stations, {len(rejected)} rejected",
+        f"{number_of(len(records), 'record')} of {number_of(len(stations), 'station')}, "
+        f"{len(rejected)} rejected",
         [*lines, *(_earthquake_lines(records) if records else [])],
         {"^": _layer(places.values())},
         {"records": rows, "rejected": [one._asdict() for one in rejected]},
@@ -163,7 +165,9 @@ def _earthquake_lines(records: "Sequence[RecordInfo]") -> Lines:
     for label in sorted(groups, key=lambda one: int(one.partition(":")[0])):
         number, _, start = label.partition(": ")
         stations = len({_station(record) for record in groups[label]})
-        text = f"{start}: {stations} stations, {len(groups[label])} records"
+        text = (
+            f"{start}: {number_of(stations, 'station')}, {number_of(len(groups[label]), 'record')}"
+        )
         lines.append((f"earthquake {number}", text))
     rest = len(lines) - MOST_EARTHQUAKES
     return [*lines[:MOST_EARTHQUAKES], *([("earthquakes", f"{rest} more")] if rest > 0 else [])]
@@ -220,7 +224,7 @@ def _of_station_list(path: Path) -> Description:
     ]
     east, north = np.array([(one.longitude, one.latitude) for one in stations]).T
     places = _shares(east, north, largest / largest.max())
-    return Description(Kind.STATION_LIST, f"{len(stations)} stations", lines, places, known)
+    return Description(Kind.STATION_LIST, number_of(len(stations), "station"), lines, places, known)
 
 
 def _shares(
@@ -281,7 +285,9 @@ def _of_dataset(spectra: "xr.Dataset") -> Description:
     if spectra.attrs.get("simulated") == "true":
         lines.append(("simulated", "the motion is SIMULATED."))
     known = {"stations": names, "periods": periods}
-    return Description(Kind.SPECTRA, f"{len(names)} stations", lines, {"^": (east, north)}, known)
+    return Description(
+        Kind.SPECTRA, number_of(len(names), "station"), lines, {"^": (east, north)}, known
+    )
 
 
 def _of_event(path: Path) -> Description:
@@ -324,7 +330,7 @@ def _of_stations(path: Path) -> Description:
         ("use", "put it with the records, or --set records.stationxml=FILE"),
     ]
     places = {"^": _layer(place for _, place in stations)}
-    title = f"{len(names)} stations"
+    title = number_of(len(names), "station")
     return Description(Kind.STATIONS, title, lines, places, {"stations": names})
 
 
@@ -353,7 +359,8 @@ def _of_pairs(path: Path) -> Description:
 def _title(counts: Mapping[str, int]) -> str:
     """Return the size of a pair table, of which the first rows are read if it is large."""
     first = f"the first {MOST_ROWS} of " if counts["rows"] > MOST_ROWS else ""
-    return f"{first}{counts['rows']} rows, {counts['usable']} usable, {counts['rejected']} rejected"
+    rows = number_of(counts["rows"], "row")
+    return f"{first}{rows}, {counts['usable']} usable, {counts['rejected']} rejected"
 
 
 def _column_lines(derived: Mapping[str, int], unused: Sequence[str]) -> Lines:
@@ -370,7 +377,7 @@ def _range_lines(table: "pd.DataFrame") -> Lines:
 
     # Pairs that touch count apart
     gaps = table["gap"]
-    pairs = f"{gaps.eq(0.0).sum()} pairs touch, {gaps.isna().sum()} unknown"
+    pairs = f"0 in {number_of(gaps.eq(0.0).sum(), 'pair')}, unknown in {gaps.isna().sum()}"
     lines = [("gap", f"{span(gaps, 'm')}; {pairs}")]
     for name in ("height", "storeys", "period"):
         numbers = np.concatenate([numbers_in(table, f"{name}_{i}") for i in (1, 2)])
@@ -440,7 +447,7 @@ def _of_worst_pairs(table: "pd.DataFrame") -> Description:
     counted = [f"{n} {state}" for state, n in states.items() if n or state in STATES]
     worst = some([str(name) for name in table["pair_id"]], 5)
     lines = [("pounding", ", ".join(counted)), ("worst pairs", worst)]
-    title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
+    title = f"{number_of(len(table), 'pair')}{' and more' if len(table) == MOST_ROWS else ''}"
     values, usable = {"pairs": len(table), **states}, len(table) > 0
     return Description(Kind.RISK, title, lines, {"": _centres(table)}, values, usable)
 
@@ -514,7 +521,7 @@ def _of_ensemble(path: Path) -> Description:
     scenarios = load(path, Ensemble).scenario
     lines = [(one.name, _presence(one.run, Path(), " yet")) for one in scenarios]
     lines.append(("use", f"per-obspy screen {path}"))
-    return Description(Kind.ENSEMBLE, f"{len(scenarios)} scenarios", lines)
+    return Description(Kind.ENSEMBLE, number_of(len(scenarios), "scenario"), lines)
 
 
 def _of_catalog(path: Path) -> Description:
@@ -522,7 +529,7 @@ def _of_catalog(path: Path) -> Description:
     from per_obspy.inventory.catalogue import stored_inventories
 
     stored = stored_inventories(path)
-    lines = [(one.name, f"{one.pairs} pairs, {one.licence}") for one in stored]
+    lines = [(one.name, f"{number_of(one.pairs, 'pair')}, {one.licence}") for one in stored]
     values = {"inventories": len(stored)}
     return Description(Kind.CATALOG, f"{len(stored)} inventories", lines, values=values)
 
@@ -564,7 +571,7 @@ def _of_result(folder: Path) -> Description:
             worst = _of_worst_pairs(table.first(MOST_ROWS, _RISK_COLUMNS))
         lines, places = [*lines, *worst.lines], {**worst.places, **places}
     lines.append(("files", some(listed_outputs([*record["outputs"], file.name]), 12)))
-    title = f"{counts.get('stations', 0)} stations, {counts.get('pairs', 0)} pairs"
+    title = ", ".join(number_of(counts.get(f"{thing}s", 0), thing) for thing in ("station", "pair"))
     return Description(Kind.RESULT, title, lines, places, record)
 
 
@@ -578,7 +585,7 @@ def _run_lines(record: Mapping[str, Any], counts: Mapping[str, int]) -> Lines:
             # Of the event where there are no groups
             time = one.get("start") or (one.get("event") or {}).get("time", "")
             stations = one.get("stations", counts.get("stations", 0))
-            lines.append(("earthquake", f"{time}, {stations} stations"))
+            lines.append(("earthquake", f"{time}, {number_of(stations, 'station')}"))
     # Rejections of footprints before the run, of everything else in it
     drawn = record.get("drawn") or {}
     if drawn.get("rejected"):

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
+import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow.dataset import dataset
 
@@ -53,7 +54,10 @@ def check_earlier(settings: Run, folder: Path) -> None:
     if not is_finished or not files:
         raise CatalogError(str(after), "after: no finished run with a risk table here")
     # Results of other versions, and of a design spectrum
-    names = dataset(files).schema.names
+    try:
+        names = dataset(files).schema.names
+    except (pa.ArrowException, OSError) as error:
+        raise CatalogError(str(files[0]), "after: a damaged table, not Parquet") from error
     if missing := [name for name in NEEDED if name not in names]:
         reason = f"after: has no column {missing[0]}: do this run again with this version"
         raise CatalogError(str(files[0]), reason)

@@ -58,7 +58,7 @@ def test_a_pair_table(tmp_path):
     (tmp_path / "pairs.csv").write_text(HEADER + ROWS)
     found, lines = _facts(tmp_path / "pairs.csv")
     assert found.title == "3 rows, 2 usable, 1 rejected"
-    assert lines["gap"] == "0 to 0.05 m; 1 pairs touch, 0 unknown"
+    assert lines["gap"] == "0 to 0.05 m; 0 in 1 pair, unknown in 0"
     assert lines["height"] == "10 to 30 m"
     assert "period_1 (2)" in lines["derived"]
     assert lines["unknown"] == "ward: carried along unchanged"
@@ -131,7 +131,7 @@ def test_configurations(tmp_path):
         'name = "e"\noutput = "o"\n[[scenario]]\nname = "near"\nrun = "run.toml"\nweight = 1\n'
     )
     found, lines = _facts(tmp_path / "e.toml")
-    assert (found.title, lines["near"]) == ("1 scenarios", str(tmp_path / "run.toml"))
+    assert (found.title, lines["near"]) == ("1 scenario", str(tmp_path / "run.toml"))
     (tmp_path / "s.toml").write_text("[scenario]\nmagnitude = 6.5\nstations = 3\n")
     assert _facts(tmp_path / "s.toml")[1]["stations"] == "3"
     (tmp_path / "wrong.toml").write_text("name = 1\n")
