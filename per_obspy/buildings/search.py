@@ -464,7 +464,7 @@ def register_tables(
     first = next(tables)
     source = (batch for table in chain([first], tables) for batch in table.to_batches())
     database.register(name, pa.RecordBatchReader.from_batches(first.schema, source))
-    return first.column_names
+    return list(first.column_names)
 
 
 def tables_of(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.Table]:

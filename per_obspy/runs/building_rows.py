@@ -66,8 +66,7 @@ def building_rows(
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
-        exact = settings.rows.exact
-        histories = settings.screening.exact if exact is None else exact
+        histories = _has_histories(settings)
         found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room, histories)
         # Without histories nothing is left to do
         tasks = _tasks(folder, ground, found) if histories else iter(())
@@ -96,6 +95,12 @@ def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, in
         "row_chunks": len(parts),
         "row_chunks_resumed": sum(part.resumed for part in parts),
     }
+
+
+def _has_histories(settings: Run) -> bool:
+    """Return whether rows are followed: as pairs are, unless the settings say otherwise."""
+    exact = settings.rows.exact
+    return settings.screening.exact if exact is None else exact
 
 
 def _tasks(folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:

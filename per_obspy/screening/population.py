@@ -360,11 +360,11 @@ def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) ->
     ``demands`` are medians, (n_pairs, n_nodes), m; ``log_std`` is the log-standard deviation of all
     demands of a pair.
     """
-    chances = np.empty((1, log_std.size))
+    chances = np.empty(log_std.size)
     median, dispersion = _lognormal_gap(table)
     deviation = np.hypot(dispersion, log_std)
-    fill_chances(np.ascontiguousarray(demands), median[None], deviation, chances)
-    return chances[0]
+    fill_chances(np.ascontiguousarray(demands), median[None], deviation, chances[None])
+    return chances
 
 
 def _received(pairs: Table) -> Both:

@@ -158,6 +158,7 @@ def fill_chances(demands, gaps, deviations, out):
     work = np.empty((3, demands.shape[1]))
     integers = np.empty(demands.shape[1], np.int64)
     for pair in range(gaps.shape[1]):
+        # Logarithms and spread of the nodes serve all gaps
         dispersion = _dispersion(demands[pair], deviations[pair], work, integers)
         for gap in range(gaps.shape[0]):
             out[gap, pair] = _chance(demands[pair], gaps[gap, pair], dispersion, work, integers)
