@@ -15,6 +15,7 @@ from per_obspy.buildings.tables import (
     write_buildings,
     write_rows,
 )
+from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.ranked_table import ranked_table, table_files
