@@ -7,7 +7,7 @@ whole numbers of all pairs are in memory: texts are sorted by a database of boun
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, pairwise
 from operator import itemgetter
@@ -23,6 +23,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from per_obspy.buildings.chains import Chains, chains_of, joints_of
+from per_obspy.buildings.columns import ROWS
 from per_obspy.buildings.contacts import (
     PROPERTIES,
     BoolArray,
@@ -55,9 +56,15 @@ FINDING = (
 #: Name of the column of areas in the file of contacts: that of the pair table may be any.
 AREA = "area_of_totals"
 
-#: Columns of pairs that contacts keep besides those of their rows; some may be absent.
+#: Columns of pairs that contacts keep besides those of their rows; some may be absent. Those that
+#: only a history needs are most of them.
 CARRIED = tuple(
     dict.fromkeys(("pair_id", "rank", "longitude", "latitude", *NEEDED, *OF_PAIRS, AREA))
+)
+WITHOUT_HISTORIES = tuple(
+    name
+    for name in CARRIED
+    if name not in NEEDED or name in OF_PAIRS or name in {column.name for column in ROWS}
 )
 
 #: Columns of a contact that its history and its row of ``rows.parquet`` need.
@@ -107,28 +114,27 @@ class AllRows(NamedTuple):
     served: Mapping[str, int]
 
 
-def find_rows(pairs: RankedTable, rows: Rows, area: str | None, room: Path) -> AllRows:
+def find_rows(
+    pairs: RankedTable, rows: Rows, area: str | None, room: Path, histories: bool
+) -> AllRows:
     """
     Find the rows of all pairs of a risk table, and write their contacts into a file in a folder.
 
     They are in their order of computation. ``area`` is the column of the area of each pair, if
-    areas have names.
+    areas have names; contacts have the columns that histories need if these are wanted.
     """
-    columns = {name: name for name in (*FINDING, *CARRIED)} | ({AREA: area} if area else {})
+    carried = CARRIED if histories else WITHOUT_HISTORIES
+    columns = {name: name for name in (*FINDING, *carried)} | ({AREA: area} if area else {})
     found = list[PieceRows]()
-    unordered, ordered = room / "unordered.parquet", room / "contacts.parquet"
-    # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
-    with one_thread_database(room) as database:
-        codes = number_buildings(pairs, database)
-        database.register("pairs", _numbered(pairs, columns, codes))
-        _write(_contacts(_pieces(database), rows, found), unordered)
-    # Buildings of one pair are numbered after those with an identifier, in the order of the pairs
-    named, own = int(codes.max()) + 1, np.sort(np.concatenate([piece.own for piece in found]))
-    with one_thread_database(room) as database, stored_rows(unordered) as stored:
-        database.register("contacts", stored)
+    ordered = room / "contacts.parquet"
+    with one_thread_database(room) as database, database.cursor() as inner:
+        # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
+        codes = number_buildings(pairs, inner)
+        inner.register("pairs", _numbered(pairs, columns, codes))
+        register_tables(database, "contacts", _contacts(_pieces(inner), rows, carried, found))
         tables = tables_of(database, _ORDERED, PIECE)
-        count = _write((_number(table, named, own) for table in tables), ordered)
-    unordered.unlink()
+        # Once the first contacts are ordered, all are found
+        count = _write(_number(tables, int(codes.max()) + 1, found), ordered)
     return AllRows(ordered, count, *_totals(found))
 
 
@@ -142,11 +148,11 @@ def _totals(found: list["PieceRows"]) -> tuple[int, tuple[Rejection, ...], Count
 
 
 def _contacts(
-    pieces: Iterable[pa.Table], rows: Rows, found: list["PieceRows"]
+    pieces: Iterable[pa.Table], rows: Rows, carried: Sequence[str], found: list["PieceRows"]
 ) -> Iterator[pa.Table]:
     """Yield the contacts of each piece, and keep what else is found in it."""
     for pairs in pieces:
-        contacts, piece = find_in_piece(pairs, rows)
+        contacts, piece = find_in_piece(pairs, rows, carried)
         found.append(piece)
         yield contacts
 
@@ -266,13 +272,15 @@ class PieceRows(NamedTuple):
     rejected: list[OrderedRejection]
 
 
-def find_in_piece(pairs: pa.Table, rows: Rows) -> tuple[pa.Table, PieceRows]:
+def find_in_piece(
+    pairs: pa.Table, rows: Rows, carried: Sequence[str]
+) -> tuple[pa.Table, PieceRows]:
     """
     Find the rows of connected pairs: their contacts, and what else is found.
 
-    Pairs have the columns ``FINDING`` and ``CARRIED``, as far as they are known, ``code_1`` and
-    ``code_2``; contacts, along each row, ``CARRIED`` and the columns of the row. The number of a
-    building of one pair only is -1 - its end.
+    Pairs have the columns ``FINDING`` and those that are carried, as far as they are known,
+    ``code_1`` and ``code_2``; contacts, along each row, have the carried ones and the columns of
+    the row. The number of a building of one pair only is -1 - its end.
     """
     contacts = contacts_of(pairs, rows.angle)
     joints = joints_of(contacts, pairs, rows.angle)
@@ -280,8 +288,8 @@ def find_in_piece(pairs: pa.Table, rows: Rows) -> tuple[pa.Table, PieceRows]:
     # Ends by the ranks of their pairs
     ends = 2 * (pairs["rank"].to_numpy()[:, None] - 1) + np.arange(2)
     columns = _columns_of_rows(chains, contacts, pairs) | _sides(chains, contacts, ends)
-    carried = pairs.select([name for name in CARRIED if name in pairs.column_names])
-    table = carried.take(pa.array(chains.pair))
+    kept = pairs.select([name for name in carried if name in pairs.column_names])
+    table = kept.take(pa.array(chains.pair))
     for name, column in columns.items():
         table = table.append_column(name, column)
     # And what is found besides
@@ -392,14 +400,19 @@ def _write(tables: Iterator[pa.Table], path: Path) -> int:
     return count
 
 
-def _number(table: pa.Table, named: int, own: IntArray) -> pa.Table:
-    """Return contacts with numbers of the buildings that belong to one pair only."""
-    for side in ("left", "right"):
-        name = f"building_number_{side}"
-        number = table[name].to_numpy()
-        number = np.where(number < 0, named + np.searchsorted(own, -1 - number), number)
-        table = table.set_column(table.column_names.index(name), name, pa.array(number))
-    return table
+def _number(tables: Iterable[pa.Table], named: int, found: list[PieceRows]) -> Iterator[pa.Table]:
+    """Yield contacts with numbers of the buildings that belong to one pair only."""
+    own: IntArray | None = None
+    for table in tables:
+        # After those with an identifier, in the order of the pairs
+        if own is None:
+            own = np.sort(np.concatenate([piece.own for piece in found]))
+        columns = dict(zip(table.column_names, table.columns, strict=True))
+        for name in ("building_number_left", "building_number_right"):
+            number = table[name].to_numpy()
+            number = np.where(number < 0, named + np.searchsorted(own, -1 - number), number)
+            columns[name] = pa.array(number)
+        yield pa.table(columns)
 
 
 def chunks_of(file: Path) -> Iterator[pa.Table]:
@@ -440,12 +453,18 @@ def one_thread_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
         yield database
 
 
-@contextmanager
-def stored_rows(file: Path) -> Iterator[pa.RecordBatchReader]:
-    """Yield the rows of a Parquet file once, for a database; a dataset would read far ahead."""
-    with pq.ParquetFile(file.absolute(), pre_buffer=False) as stored:
-        rows = stored.iter_batches(GROUP, use_threads=False)
-        yield pa.RecordBatchReader.from_batches(stored.schema_arrow, rows)
+def register_tables(
+    database: duckdb.DuckDBPyConnection, name: str, tables: Iterator[pa.Table]
+) -> list[str]:
+    """
+    Let a query of a database read tables once, as they are made, and return their columns.
+
+    The first table has all columns.
+    """
+    first = next(tables)
+    source = (batch for table in chain([first], tables) for batch in table.to_batches())
+    database.register(name, pa.RecordBatchReader.from_batches(first.schema, source))
+    return list(first.column_names)
 
 
 def tables_of(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.Table]:

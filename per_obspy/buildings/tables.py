@@ -8,7 +8,6 @@ pieces; the buildings are then ordered by their ranking.
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +24,13 @@ from per_obspy.buildings.search import (
     GROUP,
     groups_of,
     one_thread_database,
-    stored_rows,
+    register_tables,
     tables_of,
     whole_groups,
 )
 from per_obspy.buildings.sides import OF_PAIRS, UNKNOWN, building_table, directions
 from per_obspy.config import Run, Totals
-from per_obspy.files import temporary_folder, written_whole
+from per_obspy.files import written_whole
 from per_obspy.inventory.schema import Column
 from per_obspy.results.parts import text_columns
 from per_obspy.results.risk import write_worst
@@ -146,17 +145,15 @@ def write_buildings(
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
-    with temporary_folder(folder) as room, one_thread_database(room) as database:
+    with one_thread_database(folder) as database, database.cursor() as inner:
         # Buildings in the order of their numbers, then in that of their ranking
-        unranked = room / "unranked.parquet"
-        with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
-            for sides in _sides(database, folder / "rows.parquet", contacts, settings.totals):
-                buildings = building_table(sides, settings.screening.classes, settings.rows.angle)
-                writer.write_table(table_of(buildings, UNRANKED))
+        sides = _sides(inner, folder / "rows.parquet", contacts, settings.totals)
+        buildings = (
+            building_table(some, settings.screening.classes, settings.rows.angle) for some in sides
+        )
+        register_tables(database, "buildings", (table_of(some, UNRANKED) for some in buildings))
         schema = _stated_schema(BUILDINGS, facts)
-        with stored_rows(unranked) as stored:
-            database.register("buildings", stored)
-            _write_table(_ranked(database, schema), schema, table)
+        _write_table(_ranked(database, schema), schema, table)
     write_worst(table, settings.csv_rows, text)
     write_meanings(BUILDINGS, {**FLAGS, **BUILDING_FLAGS}, columns)
     return files
@@ -166,12 +163,8 @@ def _sides(
     database: duckdb.DuckDBPyConnection, rows: Path, contacts: Path, totals: Totals
 ) -> Iterator[pd.DataFrame]:
     """Yield the sides of buildings in pieces; all sides of a building are in one piece."""
-    interfaces = _interfaces(rows, contacts, totals)
-    first = next(interfaces)
-    # The first ones have the columns of all
-    source = (batch for table in chain([first], interfaces) for batch in table.to_batches())
-    database.register("interfaces", pa.RecordBatchReader.from_batches(first.schema, source))
-    sides = tables_of(database, sides_query(first.column_names), SIDES)
+    names = register_tables(database, "interfaces", _interfaces(rows, contacts, totals))
+    sides = tables_of(database, sides_query(names), SIDES)
     for table in whole_groups(sides, "building_number"):
         yield table.to_pandas()
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from scipy.special import erfcx
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import vectorised
 
 #: Added to and taken from a number below 2**51 this leaves the nearest integer.
 TO_INTEGER = 1.5 * 2.0**52
@@ -43,7 +43,7 @@ ODD = tuple(TAIL[1::2].tolist())
 FARTHEST_NORMAL = 37.0
 
 
-@kernel
+@vectorised
 def exponentials(x, integers):
     """Replace each number by its exponential; ``integers`` is scratch of the same size."""
     # x = exponent ln 2 + rest; the bits of 2**exponent, and the series of exp(rest)
@@ -61,7 +61,7 @@ def exponentials(x, integers):
         x[i] *= powers[i]
 
 
-@kernel
+@vectorised
 def exponentials_less_one(x, integers):
     """
     Replace each number by its exponential less one, without cancellation.
@@ -84,7 +84,7 @@ def exponentials_less_one(x, integers):
         x[i] = powers[i] * x[i] + (powers[i] - 1.0)
 
 
-@kernel
+@vectorised
 def logarithms(x, integers):
     """
     Replace each positive normal number by its logarithm.
@@ -106,7 +106,7 @@ def logarithms(x, integers):
         x[i] = integers[i] * LN_2 + 2.0 * part * total
 
 
-@kernel
+@vectorised
 def normal_tails(x, numbers, integers):
     """Replace each number by the probability that a standard normal variable exceeds it."""
     # exp(-x² / 2)

@@ -186,15 +186,18 @@ def schema_of(columns: Iterable[Column], facts: Mapping[str, str] | None = None)
 
 def table_of(values: Mapping[str, Any] | pd.DataFrame, columns: Sequence[Column]) -> pa.Table:
     """Return columns in the order and types of a schema; NaN is an empty cell."""
-    arrays = [_array(np.asarray(values[column.name]), column.dtype) for column in columns]
+    arrays = [_array(values[column.name], column.dtype) for column in columns]
     return pa.table(arrays, schema=schema_of(columns))
 
 
 def _array(values: Any, dtype: str) -> pa.Array:
     """Convert values to the type of their column."""
-    if dtype != "int64":
-        return pa.array(values, type=_DESCRIBED[dtype], from_pandas=True)
+    if dtype == "str" and isinstance(values, pd.Series):
+        # Texts of a frame are those of Arrow already
+        return pa.Array.from_pandas(values, type=_DESCRIBED[dtype])
     numbers = np.asarray(values)
+    if dtype != "int64":
+        return pa.array(numbers, type=_DESCRIBED[dtype], from_pandas=True)
     empty = np.isnan(numbers) if numbers.dtype.kind == "f" else np.zeros(numbers.shape, dtype=bool)
     return pa.array(np.where(empty, 0, numbers).astype(np.int64), mask=empty)
 

@@ -67,8 +67,10 @@ def building_rows(
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
-        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
-        tasks = _tasks(settings, folder, ground, found)
+        histories = _has_histories(settings)
+        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room, histories)
+        # Without histories nothing is left to do
+        tasks = _tasks(folder, ground, found) if histories else iter(())
         parts = _parts(tasks, context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
@@ -96,11 +98,14 @@ def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, in
     }
 
 
-def _tasks(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
-    """Yield one task per chunk of rows, none if histories are not wanted: nothing is left to do."""
+def _has_histories(settings: Run) -> bool:
+    """Return whether rows are followed: as pairs are, unless the settings say otherwise."""
     exact = settings.rows.exact
-    if not (settings.screening.exact if exact is None else exact):
-        return
+    return settings.screening.exact if exact is None else exact
+
+
+def _tasks(folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:
+    """Yield one task per chunk of rows."""
     stations = {station.name: station for station in ground.stations}
     for number, table in enumerate(chunks_of(found.file)):
         # Pairs that a map serves have no record

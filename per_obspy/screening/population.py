@@ -331,14 +331,25 @@ def demand_quantiles(demands: FloatArray, log_std: FloatArray, nodes: FloatArray
     """
     shares = np.array([*DEMAND_SHARES.values()])
     outcomes = demands * np.exp(np.outer(log_std, nodes[:, DEMAND]))
-    gaps = np.quantile(outcomes, shares, axis=1, method="hazen")
-    gaps = np.maximum(gaps, SMALLEST_QUANTILE)
+    gaps = np.maximum(_sorted_quantiles(outcomes, shares), SMALLEST_QUANTILE)
     # The outcomes of nodes are few: the gaps move to where the chance of contact is the wanted one
-    chance = np.array([chance_of_contact(demands, log_std, certain_gap(gap)) for gap in gaps])
+    chance = np.empty(gaps.shape)
+    fill_chances(np.ascontiguousarray(demands), gaps, log_std, chance)
     score = -ndtri(np.clip(chance, 1e-9, 1.0 - 1e-9))
     wanted = np.broadcast_to(ndtri(shares)[:, None], gaps.shape)
     moved = np.array([at_rows(score, np.log(gaps), one) for one in wanted])
     return np.maximum(np.exp(np.maximum.accumulate(moved)), SMALLEST_QUANTILE)
+
+
+def _sorted_quantiles(outcomes: FloatArray, shares: FloatArray) -> FloatArray:
+    """Return quantiles of the outcomes of each pair by Hazen's rule, (n_shares, n_pairs)."""
+    # One sort, which is vectorized, serves all shares
+    ordered = np.sort(outcomes, axis=1).T
+    position = np.clip(shares * len(ordered) - 0.5, 0.0, len(ordered) - 1.0)
+    lower = position.astype(np.int64)
+    upper = np.minimum(lower + 1, len(ordered) - 1)
+    share = (position - lower)[:, None]
+    return ordered[lower] + share * (ordered[upper] - ordered[lower])
 
 
 def at_rows(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
@@ -353,12 +364,6 @@ def at_rows(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     return value
 
 
-def certain_gap(gap: FloatArray) -> Columns:
-    """Return the columns that a chance of contact needs of pairs whose gap, m, is certain."""
-    nothing = np.zeros_like(gap)
-    return {"gap": gap, "gap_std": nothing, "assumed_gap": nothing}
-
-
 def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) -> FloatArray:
     """
     Return the mean over the nodes of the chance that a demand exceeds an uncertain gap.
@@ -367,8 +372,9 @@ def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) ->
     demands of a pair.
     """
     chances = np.empty(log_std.size)
-    deviation = np.hypot(gap_dispersion(table), log_std)
-    fill_chances(np.ascontiguousarray(demands), median_gap(table), deviation, chances)
+    median, dispersion = _lognormal_gap(table)
+    deviation = np.hypot(dispersion, log_std)
+    fill_chances(np.ascontiguousarray(demands), median[None], deviation, chances[None])
     return chances
 
 

@@ -97,7 +97,7 @@ def found_in(pairs, stations, azimuth_used=10.0):
     """Return the contacts of pairs in the order of their rows."""
     pairs = pairs.assign(station=stations, distance=1.0, azimuth_used=azimuth_used)
     table = table_of(pairs.assign(rank=np.arange(1, len(pairs) + 1)))
-    contacts, found = search.find_in_piece(table, Rows())
+    contacts, found = search.find_in_piece(table, Rows(), search.CARRIED)
     return contacts.to_pandas().sort_values(["row_id", "interface"]), found
 
 

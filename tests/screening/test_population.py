@@ -12,7 +12,6 @@ from per_obspy.screening.columns import DEMAND_SHARES
 from per_obspy.screening.population import (
     COLUMNS,
     ONE_WALL,
-    certain_gap,
     chance_of_contact,
     demand_quantiles,
 )
@@ -198,8 +197,9 @@ def test_quantiles_of_the_demand_have_their_chance_of_contact():
     demands = np.where(nodes[:, 0] > 0.5, 0.2, 0.05) * np.exp(0.2 * nodes[:, 2])
     demands, log_std = np.stack([demands, 3.0 * demands]), np.full(2, 0.3)
     quantiles = demand_quantiles(demands, log_std, nodes)
+    certain = {"gap_std": np.zeros(2), "assumed_gap": np.zeros(2)}
     for gap, share in zip(quantiles, shares, strict=True):
-        chance = chance_of_contact(demands, log_std, certain_gap(gap))
+        chance = chance_of_contact(demands, log_std, {"gap": gap, **certain})
         # one step of linear interpolation between outcomes of 128 nodes
         assert_allclose(chance, 1.0 - share, atol=0.02)
     assert_allclose(quantiles[:, 1], 3.0 * quantiles[:, 0], rtol=1e-9)

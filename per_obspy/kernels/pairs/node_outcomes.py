@@ -63,7 +63,8 @@ def fill_outcomes(motion, facts, deviates, out):
     for pair in range(facts.shape[1]):
         pair_motion, fact = motion[:, pair], facts[:, pair]
         deviation = math.hypot(fact[GAP_STD], fact[DEMAND_STD])
-        out[0, pair] = _chance(pair_motion[DEMAND], fact[GAP], deviation, work, integers)
+        dispersion = _dispersion(pair_motion[DEMAND], deviation, work, integers)
+        out[0, pair] = _chance(pair_motion[DEMAND], fact[GAP], dispersion, work, integers)
         # Scales of the demand, and gaps
         for node in range(count):
             work[0, node] = fact[DEMAND_STD] * deviates[0, node]
@@ -142,51 +143,59 @@ def _amplification(motion, work, node, fact):
 @kernel
 def fill_chances(demands, gaps, deviations, out):
     """
-    Fill the mean over the nodes of the chance that a lognormal demand exceeds a lognormal gap.
+    Fill the mean over the nodes of the chance that a lognormal demand exceeds lognormal gaps.
 
     Parameters
     ----------
     demands : (n_pairs, n_nodes) ndarray
         Medians, m.
-    gaps : (n_pairs,) ndarray
-        Medians, m.
+    gaps : (n_gaps, n_pairs) ndarray
+        Medians of one or several gaps of each pair, m.
     deviations : (n_pairs,) ndarray
         Log-standard deviations of demand over gap.
-    out : (n_pairs,) ndarray
+    out : (n_gaps, n_pairs) ndarray
         Receives the chances, from 0 to 1.
     """
-    work = np.empty((4, demands.shape[1]))
+    work = np.empty((3, demands.shape[1]))
     integers = np.empty(demands.shape[1], np.int64)
-    for pair in range(gaps.size):
-        out[pair] = _chance(demands[pair], gaps[pair], deviations[pair], work, integers)
+    for pair in range(gaps.shape[1]):
+        # Logarithms and spread of the nodes serve all gaps
+        dispersion = _dispersion(demands[pair], deviations[pair], work, integers)
+        for gap in range(gaps.shape[0]):
+            out[gap, pair] = _chance(demands[pair], gaps[gap, pair], dispersion, work, integers)
 
 
 @kernel
-def _chance(demands, gap, deviation, work, integers):
-    """Return the chance of contact of a pair."""
-    largest, above = 0.0, 0
+def _dispersion(demands, deviation, work, integers):
+    """Return the log-standard deviation of a node over a gap, and fill the nodes' logarithms."""
+    largest = 0.0
     for node in range(demands.size):
         largest = max(largest, demands[node])
-        above += demands[node] > gap
-    if gap <= 0.0 or largest <= 0.0:
-        return above / demands.size
     # nodes are smoothed as far as no other value is uncertain
     smoothing = _smoothing(demands, largest, deviation, work[0], work[1], integers)
-    dispersion = max(deviation, smoothing)
-    if dispersion <= 0.0:
+    for node in range(demands.size):
+        work[0, node] = demands[node] if demands[node] > 0.0 else TINY
+    logarithms(work[0], integers)
+    return 0.0 if largest <= 0.0 else max(deviation, smoothing)
+
+
+@kernel
+def _chance(demands, gap, dispersion, work, integers):
+    """Return the chance of contact of a pair, after :func:`_dispersion`."""
+    if gap <= 0.0 or dispersion <= 0.0:
+        above = 0
+        for node in range(demands.size):
+            above += demands[node] > gap
         return above / demands.size
     # Tails of the normal distribution at the logarithms of gap over demand
-    for node in range(demands.size):
-        work[2, node] = demands[node] if demands[node] > 0.0 else TINY
-    logarithms(work[2], integers)
     middle = math.log(gap)
     for node in range(demands.size):
-        margin = (middle - work[2, node]) / dispersion
-        work[2, node] = min(max(margin, -FARTHEST_NORMAL), FARTHEST_NORMAL)
-    normal_tails(work[2], work[3], integers)
+        margin = (middle - work[0, node]) / dispersion
+        work[1, node] = min(max(margin, -FARTHEST_NORMAL), FARTHEST_NORMAL)
+    normal_tails(work[1], work[2], integers)
     total = 0.0
     for node in range(demands.size):
-        total += work[2, node] if demands[node] > 0.0 else 0.0
+        total += work[1, node] if demands[node] > 0.0 else 0.0
     return total / demands.size
 
 

@@ -97,9 +97,11 @@ def test_against_the_definition(nodes):
     fill_outcomes(motion, facts, deviates, found)
     # the polynomial of the normal tail is exact to 1e-14
     assert_allclose(found, _definition(motion, facts, deviates), rtol=1e-12, atol=1e-14)
-    chances = np.empty(PAIRS)
-    fill_chances(motion[0], facts[0], np.hypot(facts[1], facts[2]), chances)
-    assert_allclose(chances, found[0], rtol=1e-15)
+    # of several gaps of each pair at once
+    chances, gaps = np.empty((2, PAIRS)), np.stack([facts[0], facts[0] + 1e3])
+    fill_chances(motion[0], gaps, np.hypot(facts[1], facts[2]), chances)
+    assert_allclose(chances[0], found[0], rtol=1e-15)
+    assert (chances[1] <= chances[0]).all()
 
 
 def _amplification(motion, received):
