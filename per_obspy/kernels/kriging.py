@@ -86,6 +86,7 @@ def _estimate(stations, trend, sites, row, nearest, weights, unexplained, out):
             # Median: trend and weighted residuals
             _unmatched(features, own, middles, nearest, weights, unmatched)
             estimate = _trend(trend[0][column], own, middles)
+            estimate -= _unknown(trend[0][column], own, middles, unmatched)
             median += share * (estimate + _weighted(weights, residuals, nearest, column))
             # Variance: of the residual, and of the part of the trend that weights do not cancel
             variance += (
@@ -232,6 +233,20 @@ def _trend(coefficients, values, middles):
     total = coefficients[0]
     for number in range(middles.size):
         total += coefficients[number + 1] * _feature(values, middles, number)
+    return total
+
+
+@kernel
+def _unknown(coefficients, values, middles, unmatched):
+    """
+    Return by how much a trend is too low at a site of which a feature is unknown, with its sign.
+
+    The feature is that of its stations, by their weights: their residuals lack what theirs does.
+    """
+    total = 0.0
+    for number in range(middles.size):
+        if math.isnan(values[number]):
+            total += coefficients[number + 1] * unmatched[number + 1]
     return total
 
 

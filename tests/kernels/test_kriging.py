@@ -140,11 +140,17 @@ def test_deviation_is_zero_at_a_station_and_nan_without_one():
     assert np.isnan(_kriged(stations, late)).all()
 
 
-def test_an_unknown_feature_is_the_middle_one():
+def test_an_unknown_feature_is_that_of_the_stations():
+    # catches: residuals of near stations, which lack the effect of their own feature, added to the
+    # trend at the middle feature
     stations, sites = _stations(6), _sites(4)
-    unknown, middle = sites[1].copy(), sites[1].copy()
-    unknown[:, 0], middle[:, 0] = np.nan, TREND[2][0, 0]
-    first, second = (
-        _kriged(stations, (sites[0], features, *sites[2:])) for features in (unknown, middle)
-    )
-    assert_allclose(first, second, rtol=1e-14)
+    unknown = np.full((6, 2), np.nan)
+    # at a station the motion is that of the station
+    at_stations = (stations[0], unknown, *_sites(6)[2:])
+    trend = TREND[0][0, 0] + TREND[0][0, 1] * (stations[3][:, 0] - TREND[2][0, 0])
+    got = _kriged(stations, at_stations)
+    assert_allclose(got[:, 0], trend + stations[4][:, 0], rtol=1e-12)
+    # far from all stations the trend at the middle is left, with the same deviation
+    far = (-stations[0][:1], unknown[:1], *_alone(sites, 0)[2:])
+    middle = (far[0], np.full((1, 2), TREND[2][0, 0]), *far[2:])
+    assert_allclose(_kriged(stations, far), _kriged(stations, middle), rtol=1e-12)
