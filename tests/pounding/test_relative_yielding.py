@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from per_obspy.pounding import relative
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.relative import (
     approach,
@@ -163,6 +164,25 @@ def test_the_approach_of_populations_is_nearly_exact(ground, pairs, strength):
     reference = approach(*ground, DT, **pairs)
     assert_allclose(linear.displacement, reference.displacement, rtol=0.016)
     assert_allclose(linear.velocity, reference.velocity, rtol=0.03)
+
+
+def test_what_the_approach_leaves_out_changes_nothing(ground, pairs, strength, monkeypatch):
+    # catches: a round taken as elastic in which a structure yields, a record left before its last
+    # maximum, a beginning that still counts
+    noise = 0.05 * np.random.default_rng(6).normal(size=(2, 9000))
+    # 30 s far below the strength of all, the shaking, and 30 s that fade
+    record = np.hstack([1e-2 * noise[:, :3000], ground, ground[:, :600:-1] / 3.0, noise[:, 3000:]])
+    both = pairs | strength | {"damping_1": 0.02 + pairs["damping_1"]}
+    both |= {"damping_2": 0.02 + pairs["damping_2"]}
+    found = yielding_approach(record, DT, **both)
+    # no step is quiet, and an infinite acceleration needs the whole arithmetic to the end
+    whole = np.full((2, 100_000), np.inf)
+    strongest = relative._strongest
+    monkeypatch.setattr(
+        relative, "_strongest", lambda motion: (0, whole[:, : strongest(motion)[1].shape[1]])
+    )
+    # rounding, and 5e-5 of a motion a thousandth as strong
+    assert_allclose(np.stack(found), np.stack(yielding_approach(record, DT, **both)), rtol=1e-7)
 
 
 def rest_by_ode(pulse, period, damping, yields, hardening):
