@@ -82,6 +82,7 @@ def yielding_approach(north, east, dt, quiet, strongest, pairs, largest):
             if _is_below(local, strongest[1, number], EVER, True):
                 break
             _flush(local)
+            # half of the arithmetic where nothing yields
             elastic = _is_below(local, strongest[0, number], SOON, False)
             step = number * CHECKED_STEPS
             for i in range(step, step + CHECKED_STEPS, 4):
@@ -242,6 +243,7 @@ def _moved(t, k, u, z, p, start, end):
 @inlined
 def _moved_elastically(t, k, u, z, up, zp, start, end):
     """Return displacement and velocity over omega after one step in which nothing yields."""
+    # exact where acceleration is linear between samples
     after = t[UU + k] * u + (t[UZ + k] * z + (up + (t[U0 + k] * start + t[U1 + k] * end)))
     speed = t[ZU + k] * u + (t[ZZ + k] * z + (zp + (t[Z0 + k] * start + t[Z1 + k] * end)))
     return after, speed
@@ -275,6 +277,7 @@ def _is_below(t, acceleration, moved, settled):
             plastic = (1.0 - t[HARDENING + k]) * t[P + k]
             from_rest = t[U + k] - plastic
             radius = np.sqrt(from_rest * from_rest + t[Z + k] * t[Z + k])
+            # what is there fades, and the ground adds this
             radius += acceleration * t[moved + k]
             if abs(plastic - t[P + k]) + radius > t[LIMIT + k]:
                 return False
