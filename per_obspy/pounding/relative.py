@@ -33,6 +33,9 @@ FORGOTTEN, FORGOTTEN_OF_APPROACH = 1e-12, 1e-7
 #: % at most; longest free vibration after the record, s.
 LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
 
+#: Part of the largest acceleration up to which the beginning of a record is quiet.
+QUIET = 1e-3
+
 
 class RelativeDisplacement(NamedTuple):
     """
@@ -291,8 +294,8 @@ def yielding_approach(
         # the kernel fills a whole array
         some = np.compress(alike, structures, axis=1)
         own = np.empty_like(some[:2])
-        shaken = number * (record.shape[1] - 1)
-        fill_approach(*_in_steps(record, step, number), step / number, shaken, some, own)
+        motion = _in_steps(record, step, number)
+        fill_approach(*motion, step / number, *_strongest(motion), some, own)
         largest[:, alike] = own
     return Approach(*largest.reshape(2, *pairs.shape))
 
@@ -311,6 +314,16 @@ def _in_steps(record: FloatArray, dt: float, parts: int) -> FloatArray:
     rounds = -(-(last + int(FREE_VIBRATION / dt)) // CHECKED_STEPS)
     times = np.arange(rounds * CHECKED_STEPS * parts + 1) / parts
     return np.stack([np.interp(times, np.arange(last + 1), one, right=0.0) for one in record])
+
+
+def _strongest(motion: FloatArray) -> tuple[int, FloatArray]:
+    """Return the steps of a quiet beginning, and the largest accelerations of `fill_approach`."""
+    strength = np.hypot(*motion)
+    quiet = int((strength > QUIET * strength.max()).argmax())
+    # of each round with both of its ends, and from its start on
+    rounds = strength[:-1].reshape(-1, CHECKED_STEPS).max(axis=1)
+    rounds = np.maximum(rounds, strength[CHECKED_STEPS::CHECKED_STEPS])
+    return quiet, np.stack([rounds, np.maximum.accumulate(rounds[::-1])[::-1]])
 
 
 def _maxima(

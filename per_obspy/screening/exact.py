@@ -53,6 +53,8 @@ EXACT_COLUMNS = (
 #: Share of the gap below which a demand without contact, known to 1e-9, leaves the pair apart.
 CERTAINLY_APART = 1.0 - 1e-6
 
+#: Share of the yield displacement below which an elastic displacement, known to 1e-9, is elastic.
+CERTAINLY_ELASTIC = 1.0 - 1e-6
 
 #: Axes of which the worst is that of buildings that yield, degrees: 6 off the worst of all, where a
 #: linear demand is 0.5 % less at most.
@@ -107,16 +109,23 @@ def can_yield(pairs: Table) -> BoolArray:
     return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
 
 
+def _yields(pairs: Table) -> BoolArray:
+    """Return a mask of the pairs of which the record makes a building yield without contact."""
+    displacement, limit = (np.stack(both(pairs, name)) for name in ("sd", "yield_displacement"))
+    return np.asarray((displacement > CERTAINLY_ELASTIC * limit).any(axis=0))
+
+
 def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> Columns:
     """
     Compute exact relative displacements and pounding histories of a block of pairs.
 
     ``azimuth`` is that of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
     Pairs whose azimuth is unknown are turned by 180 degrees where the demand is larger there.
-    ``table`` holds completed pairs with their radii along the azimuth, and ``azimuth_used``.
+    ``table`` holds completed pairs with their radii and spectral displacements along the azimuth,
+    and ``azimuth_used``.
     Returns ``EXACT_COLUMNS`` and ``azimuth_used``, (n_pairs,), see ``columns.RESULTS``.
     """
-    towards, away, *others = _without_contact(station, table, azimuth)
+    towards, away, *others = _without_contact(station, table, azimuth, _yields(table))
     # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one
     turned = np.isnan(values(table, "azimuth")) & (away > towards)
     demand, axis = np.where(turned, away, towards), values(table, "azimuth_used")
@@ -172,7 +181,7 @@ def no_outcome(count: int) -> Columns:
 
 def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
     """Return the largest relative displacement of 1 towards 2, as in :func:`exact_outcome`, m."""
-    towards: FloatArray = _without_contact(station, table, azimuth)[0]
+    towards: FloatArray = _without_contact(station, table, azimuth, can_yield(table))[0]
     return towards
 
 
@@ -219,18 +228,19 @@ def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -
     return maxima
 
 
-def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+def _without_contact(
+    station: StationMotion, table: Table, azimuth: FloatArray, yields: BoolArray
+) -> FloatArray:
     """
     Return the response at contact level of pairs that do not touch, (6, n_pairs), m.
 
     Largest relative displacement of 1 towards 2, and with the buildings in the other order; PER of
-    both buildings; their displacements at rest afterwards. Linear pairs take the shorter
-    computation, and their PER from the table.
+    both buildings; their displacements at rest afterwards. Pairs that do not yield take the
+    shorter computation, and their PER from the table.
     """
     # Linear buildings rest where they were
     free = np.zeros((6, azimuth.size))
     free[2:4] = at_contact(table, "per")
-    yields = can_yield(table)
     if not yields.all():
         arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
         linear = directional_relative_displacement(*station.components, *arguments)

@@ -79,8 +79,9 @@ def compute(folder: Path, seed: int, count: int) -> Measured:
         if unknown.any():
             some = {name: column[unknown] for name, column in block.items()}
             azimuth[unknown] = furthest_azimuth(motions[station], some)
-        # radii only scale a column that is not used
-        ones = {"azimuth_used": azimuth, "per_1": np.ones(size), "per_2": np.ones(size)}
+        # radii only scale a column that is not used; no displacement is below a yield displacement
+        ones = {f"{name}_{i}": np.full(size, np.inf) for name in ("per", "sd") for i in (1, 2)}
+        ones["azimuth_used"] = azimuth
         outcome = exact_outcome(motions[station], block | ones, azimuth)
         seconds += time.process_time() - start
         pairs += size

@@ -44,7 +44,8 @@ def test_no_axis_demands_more_than_the_furthest_one(record):
     furthest = furthest_azimuth(record, pairs)
     assert len(set(furthest.tolist())) == 1
     azimuth = furthest + np.arange(37) * 10.0
-    table = pairs.assign(per_1=1.0, per_2=1.0, azimuth=azimuth, azimuth_used=azimuth)
+    radii = {"per_1": 1.0, "per_2": 1.0, "sd_1": 1.0, "sd_2": 1.0}
+    table = pairs.assign(**radii, azimuth=azimuth, azimuth_used=azimuth)
     demand = exact_outcome(record, table, azimuth)["demand_exact"]
     # samples choose the direction: up to (omega dt)² / 8 = 0.2 % at 0.6 s below the exact maximum
     assert demand[0] >= demand.max() * (1.0 - 2e-3)
@@ -158,6 +159,28 @@ class TestYieldingPairs:
         # yielding matters
         linear = per_obspy.risk_table(weaker, make_pairs([{}])).iloc[0]["demand"]
         assert abs(row["demand"] / linear - 1.0) > 0.05
+
+    def test_a_building_yields_from_its_largest_elastic_displacement_on(self, weaker, monkeypatch):
+        # catches: a yield displacement at the other height, and that of one building for both
+        linear = per_obspy.risk_table(weaker, make_pairs([{}])).iloc[0]
+        limits = [
+            {f"yield_displacement_{i}": share * linear[f"sd_{i}"], "hardening_1": 0.05}
+            for i in (1, 2)
+            for share in (1.001, 0.98)
+        ]
+        run = []
+
+        def counted(*arguments, **strengths):
+            run.append(arguments[2].size)
+            return yielding_relative_displacement(*arguments, **strengths)
+
+        monkeypatch.setattr(exact, "yielding_relative_displacement", counted)
+        table = per_obspy.risk_table(weaker, make_pairs(limits)).sort_values("pair_id")
+        assert run == [2]
+        # elastic ones are linear; the others come to rest elsewhere
+        assert_allclose(table["demand_exact"].iloc[[0, 2]], linear["demand_exact"], rtol=1e-12)
+        rests = table[["residual_1", "residual_2"]].to_numpy()
+        assert_array_equal(rests != 0.0, [[0, 0], [1, 0], [0, 0], [0, 1]])
 
     def test_is_the_gap_from_which_the_history_has_no_impact(self, weaker):
         demand = per_obspy.risk_table(weaker, make_pairs([ROW])).iloc[0]["demand"]
