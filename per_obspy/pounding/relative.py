@@ -33,9 +33,6 @@ FORGOTTEN, FORGOTTEN_OF_APPROACH = 1e-12, 1e-7
 #: % at most; longest free vibration after the record, s.
 LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
 
-#: Part of the largest acceleration up to which the beginning of a record is quiet.
-QUIET = 1e-3
-
 
 class RelativeDisplacement(NamedTuple):
     """
@@ -295,7 +292,7 @@ def yielding_approach(
         some = np.compress(alike, structures, axis=1)
         own = np.empty_like(some[:2])
         motion = _in_steps(record, step, number)
-        fill_approach(*motion, step / number, *_strongest(motion), some, own)
+        fill_approach(*motion, step / number, _strongest(motion), some, own)
         largest[:, alike] = own
     return Approach(*largest.reshape(2, *pairs.shape))
 
@@ -316,14 +313,12 @@ def _in_steps(record: FloatArray, dt: float, parts: int) -> FloatArray:
     return np.stack([np.interp(times, np.arange(last + 1), one, right=0.0) for one in record])
 
 
-def _strongest(motion: FloatArray) -> tuple[int, FloatArray]:
-    """Return the steps of a quiet beginning, and the largest accelerations of `fill_approach`."""
-    strength = np.hypot(*motion)
-    quiet = int((strength > QUIET * strength.max()).argmax())
-    # of each round with both of its ends, and from its start on
-    rounds = strength[:-1].reshape(-1, CHECKED_STEPS).max(axis=1)
-    rounds = np.maximum(rounds, strength[CHECKED_STEPS::CHECKED_STEPS])
-    return quiet, np.stack([rounds, np.maximum.accumulate(rounds[::-1])[::-1]])
+def _strongest(motion: FloatArray) -> FloatArray:
+    """Return the largest acceleration from the start of each round of steps on."""
+    rounds = np.hypot(*motion)[:-1].reshape(-1, CHECKED_STEPS).max(axis=1)
+    # after the record the ground rests, and so it does at the last end
+    strongest: FloatArray = np.maximum.accumulate(rounds[::-1])[::-1]
+    return strongest
 
 
 def _maxima(

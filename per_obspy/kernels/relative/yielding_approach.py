@@ -8,12 +8,11 @@ exact where both are linear between samples. In a step p grows by what its elast
 not follow. So every structure, elastic or not, is the same arithmetic in every step. Where yielding
 begins or ends between two samples p bends; the error is of second order in the step.
 
-Most of a record is too weak to make a structure yield. From rest it moves a structure by at most
-``a q X / omega²``, a being the largest acceleration and X the integral of the impulse response,
-``2 / (1 - rho)`` at most, where rho is the ratio of two peaks of free vibration in succession, and
-a tenth of a second of a record moves it by less. Beside the motion that is there this shows the
-rounds of steps in which nothing yields, which take half of the arithmetic, and the step from which
-nothing can exceed the maxima so far.
+The end of a record is too weak to raise a maximum. From rest it moves a structure by at most ``a q
+X / omega²``, a being the largest acceleration that is left and X the integral of the impulse
+response, ``2 / (1 - rho)`` at most, where rho is the ratio of two peaks of free vibration in
+succession. Beside the motion that is there this shows the step from which nothing can exceed the
+maxima so far. What a pair shares a block with changes no bit of it.
 """
 
 import numpy as np
@@ -25,12 +24,8 @@ from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE
 
 #: Pairs next to each other: a constant trip count, which the compiler turns into vectors.
 LANES = 32
-#: Steps of a round, before which is checked what can still yield, or raise a maximum.
+#: Steps of a round, before which is checked whether a maximum can still be raised.
 CHECKED_STEPS = 64
-
-#: Time constants of free vibration before the end of a quiet beginning, of which the rest does not
-#: count: what is left of its motion then is 5e-5 of it.
-REMEMBERED = 10.0
 
 #: Displacement of an undamped structure by a small acceleration: 0 without any.
 UNBOUNDED = 1e100
@@ -38,19 +33,18 @@ UNBOUNDED = 1e100
 #: Rows of a structure in a block, one column per pair: displacement, velocity over omega, plastic
 #: displacement; what a step makes of these and of the acceleration at its start and its end, of
 #: displacement and of velocity; what a change of p adds to both; yield displacement; growth of p
-#: over what is beyond it; omega; hardening; largest displacement by an acceleration of 1, ever and
-#: in a round. After both structures: the direction, and the largest relative displacement and
-#: velocity.
-STRUCTURE, DIRECTION, ROWS = 21, 42, 46
+#: over what is beyond it; omega; hardening; largest displacement by an acceleration of 1. After
+#: both structures: the direction, and the largest relative displacement and velocity.
+STRUCTURE, DIRECTION, ROWS = 20, 40, 44
 U, Z, P = (row * LANES for row in range(3))
 UU, UZ, UP, U0, U1, ZU, ZZ, ZP, Z0, Z1 = (row * LANES for row in range(3, 13))
-UD, ZD, LIMIT, GROWTH, OMEGA, HARDENING, EVER, SOON = (row * LANES for row in range(13, 21))
+UD, ZD, LIMIT, GROWTH, OMEGA, HARDENING, REACH = (row * LANES for row in range(13, 20))
 SECOND = STRUCTURE * LANES
 NORTH, EAST, DISTANCE, SPEED = (row * LANES for row in range(DIRECTION, ROWS))
 
 
 @kernel
-def yielding_approach(north, east, dt, quiet, strongest, pairs, largest):
+def yielding_approach(north, east, dt, strongest, pairs, largest):
     """
     Fill the largest relative displacements and velocities of pairs that may yield, at the samples.
 
@@ -61,10 +55,8 @@ def yielding_approach(north, east, dt, quiet, strongest, pairs, largest):
         vibration is followed as far as it counts; ``n_rounds`` of ``CHECKED_STEPS``, and one.
     dt : float
         Time between samples, s.
-    quiet : int
-        Steps of a quiet beginning: a maximum in it does not count.
-    strongest : (2, n_rounds) ndarray
-        Largest acceleration in any direction in each round, and from its start on, m/s².
+    strongest : (n_rounds,) ndarray
+        Largest acceleration in any direction from the start of each round on, m/s².
     pairs : (12, n) ndarray
         Rows: circular frequency (rad/s), damping (fraction of critical), participation
         (dimensionless), yield displacement at contact level (m) and hardening of structure 1, then
@@ -78,12 +70,11 @@ def yielding_approach(north, east, dt, quiet, strongest, pairs, largest):
         for lane in range(LANES):
             _pack(pairs, min(first + lane, pairs.shape[1] - 1), dt, table, lane)
         local = aligned_line(table, ROWS, LANES)
-        for number in range(_first_round(local, quiet), strongest.shape[1]):
-            if _is_below(local, strongest[1, number], EVER, True):
+        # until nothing can raise a maximum
+        for number in range(strongest.size):
+            if _is_settled(local, strongest[number]):
                 break
             _flush(local)
-            # half of the arithmetic where nothing yields
-            elastic = _is_below(local, strongest[0, number], SOON, False)
             step = number * CHECKED_STEPS
             for i in range(step, step + CHECKED_STEPS, 4):
                 n0, n1, n2, n3, n4 = (
@@ -94,10 +85,7 @@ def yielding_approach(north, east, dt, quiet, strongest, pairs, largest):
                     north[i + 4],
                 )
                 e0, e1, e2, e3, e4 = east[i], east[i + 1], east[i + 2], east[i + 3], east[i + 4]
-                if elastic:
-                    _elastic_step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
-                else:
-                    _step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+                _step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
         # maxima of the block without the copies
         for lane in range(min(LANES, pairs.shape[1] - first)):
             largest[0, first + lane] = local[DISTANCE + lane]
@@ -136,7 +124,6 @@ def _pack(pairs, number, dt, table, lane):
         ratio = np.exp(-np.pi * damping / np.sqrt(1.0 - damping * damping))
         ever = 2.0 / (1.0 - ratio) if damping > 0.0 else UNBOUNDED
         table[row + 19, lane] = share * ever / (omega * omega)
-        table[row + 20, lane] = share * min(ever, CHECKED_STEPS * dt * omega) / (omega * omega)
     # direction
     table[DIRECTION, lane], table[DIRECTION + 1, lane] = pairs[10, number], pairs[11, number]
 
@@ -193,82 +180,23 @@ def _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         t[SPEED + lane] = max(speed, omega * z - omega_2 * y)
 
 
-@vectorised
-def _elastic_step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
-    """Advance a block in which nothing yields by four steps, as `_step` does."""
-    for lane in range(LANES):
-        other = SECOND + lane
-        # accelerations along the azimuth
-        cosine, sine = t[NORTH + lane], t[EAST + lane]
-        a0, a1, a2 = cosine * n0 + sine * e0, cosine * n1 + sine * e1, cosine * n2 + sine * e2
-        a3, a4 = cosine * n3 + sine * e3, cosine * n4 + sine * e4
-        # states, what the plastic displacements make of them, and the largest values so far
-        u, z, w, y = t[U + lane], t[Z + lane], t[U + other], t[Z + other]
-        up, zp = t[UP + lane] * t[P + lane], t[ZP + lane] * t[P + lane]
-        wp, yp = t[UP + other] * t[P + other], t[ZP + other] * t[P + other]
-        omega, omega_2 = t[OMEGA + lane], t[OMEGA + other]
-        distance, speed = t[DISTANCE + lane], t[SPEED + lane]
-        # first step
-        u, z = _moved_elastically(t, lane, u, z, up, zp, a0, a1)
-        w, y = _moved_elastically(t, other, w, y, wp, yp, a0, a1)
-        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
-        # second step
-        u, z = _moved_elastically(t, lane, u, z, up, zp, a1, a2)
-        w, y = _moved_elastically(t, other, w, y, wp, yp, a1, a2)
-        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
-        # third step
-        u, z = _moved_elastically(t, lane, u, z, up, zp, a2, a3)
-        w, y = _moved_elastically(t, other, w, y, wp, yp, a2, a3)
-        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
-        # fourth step
-        u, z = _moved_elastically(t, lane, u, z, up, zp, a3, a4)
-        w, y = _moved_elastically(t, other, w, y, wp, yp, a3, a4)
-        # states and largest values after them
-        t[U + lane], t[Z + lane], t[U + other], t[Z + other] = u, z, w, y
-        t[DISTANCE + lane] = max(distance, u - w)
-        t[SPEED + lane] = max(speed, omega * z - omega_2 * y)
-
-
 @inlined
 def _moved(t, k, u, z, p, start, end):
     """Return the state of a structure after one step."""
-    # as if it did not yield
-    after, speed = _moved_elastically(t, k, u, z, t[UP + k] * p, t[ZP + k] * p, start, end)
+    # as if it did not yield: exact where acceleration is linear between samples
+    force = t[UP + k] * p + (t[U0 + k] * start + t[U1 + k] * end)
+    after = t[UU + k] * u + (t[UZ + k] * z + force)
+    force = t[ZP + k] * p + (t[Z0 + k] * start + t[Z1 + k] * end)
+    speed = t[ZU + k] * u + (t[ZZ + k] * z + force)
     # the elastic displacement is at most the yield displacement
     elastic, limit = after - p, t[LIMIT + k]
     grown = t[GROWTH + k] * (elastic - min(max(elastic, -limit), limit))
     return after + t[UD + k] * grown, speed + t[ZD + k] * grown, p + grown
 
 
-@inlined
-def _moved_elastically(t, k, u, z, up, zp, start, end):
-    """Return displacement and velocity over omega after one step in which nothing yields."""
-    # exact where acceleration is linear between samples
-    after = t[UU + k] * u + (t[UZ + k] * z + (up + (t[U0 + k] * start + t[U1 + k] * end)))
-    speed = t[ZU + k] * u + (t[ZZ + k] * z + (zp + (t[Z0 + k] * start + t[Z1 + k] * end)))
-    return after, speed
-
-
 @lean
-def _first_round(t, quiet):
-    """Return the first round whose motion counts after a quiet beginning of so many steps."""
-    slowest = np.inf
-    for lane in range(LANES):
-        for k in (lane, SECOND + lane):
-            # the decay of free vibration over a step, from its coefficients
-            slowest = min(slowest, -np.log(t[UU + k] * t[ZZ + k] - t[UZ + k] * t[ZU + k]) / 2.0)
-    if slowest * quiet <= REMEMBERED:
-        return 0
-    return int(quiet - REMEMBERED / slowest) // CHECKED_STEPS
-
-
-@lean
-def _is_below(t, acceleration, moved, settled):
-    """
-    Return whether an acceleration makes no structure yield, and, if asked, raises no maximum.
-
-    ``moved`` is the row of displacements by an acceleration of 1.
-    """
+def _is_settled(t, acceleration):
+    """Return whether an acceleration makes no structure yield, and raises no maximum."""
     for lane in range(LANES):
         reach = speed = 0.0
         for body in range(2):
@@ -278,11 +206,11 @@ def _is_below(t, acceleration, moved, settled):
             from_rest = t[U + k] - plastic
             radius = np.sqrt(from_rest * from_rest + t[Z + k] * t[Z + k])
             # what is there fades, and the ground adds this
-            radius += acceleration * t[moved + k]
+            radius += acceleration * t[REACH + k]
             if abs(plastic - t[P + k]) + radius > t[LIMIT + k]:
                 return False
             reach += radius + (plastic if body == 0 else -plastic)
             speed += t[OMEGA + k] * radius
-        if settled and (reach > t[DISTANCE + lane] or speed > t[SPEED + lane]):
+        if reach > t[DISTANCE + lane] or speed > t[SPEED + lane]:
             return False
     return True
