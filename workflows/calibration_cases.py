@@ -57,6 +57,9 @@ KEPT = (
     "critical_gap_sd", "critical_gap_linearized",
 )  # fmt: skip
 
+#: What is assumed of buildings.
+BUILDING = Building()
+
 #: Log-standard deviation of amplitudes that vary over the city, and the period (s) whose spatial
 #: correlation they have.
 AMPLITUDE, CORRELATED_AS = 0.5, 1.0
@@ -185,7 +188,9 @@ def _amplitudes(places: Sequence, seed: int) -> FloatArray:
     return np.exp(AMPLITUDE * root @ np.random.default_rng([seed, 2]).standard_normal(len(places)))
 
 
-def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> pd.DataFrame:
+def predicted(
+    known: Network, sites: Sequence[Site], count: int, seed: int, building: Building = BUILDING
+) -> pd.DataFrame:
     """Return the risk table of pairs at sites, made from the stations alone, and their ``site``."""
     east, north = (
         np.array([getattr(site, name) for site in sites]) for name in ("longitude", "latitude")
@@ -199,7 +204,7 @@ def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> p
     stations, _ = stations_of(known.stations)
     source = Hypocentre(known.scenario.longitude, known.scenario.latitude, known.scenario.depth)
     field = prepared_field(known.stations, Interpolation(), source)
-    rows, _ = risk_rows(pairs, RegionalMotion(stations, field, None), Building(), Screening())
+    rows, _ = risk_rows(pairs, RegionalMotion(stations, field, None), building, Screening())
     return rows.sort_values("pair_id", ignore_index=True)
 
 

@@ -35,7 +35,7 @@ def kind_table(pairs: pd.DataFrame) -> Iterator[str]:
         "| Brier score | if true | of the share | sharp |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
-    for kind in KINDS:
+    for kind in filter(lambda kind: pairs[kind].any(), KINDS):
         some = pairs[pairs[kind]]
         told, pounded = some["probability"], some["pounded"].astype(float)
         share, sharp = pounded.mean(), ((told < SHARP) | (told > 1.0 - SHARP)).mean()

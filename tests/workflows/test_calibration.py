@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from per_obspy.config import Building
+
 pytestmark = pytest.mark.long
 
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
@@ -26,14 +28,14 @@ def calibration():
 
 @pytest.fixture(scope="module")
 def at_stations(calibration):
-    """Return pairs at the stations of two earthquakes, all with gaps that were estimated."""
+    """Return linear pairs at stations of two earthquakes, all with gaps that were estimated."""
     cases, _ = calibration
-    told = []
+    told, linear = [], Building(strength="none")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cases, "ESTIMATED", 1.0)
         for event in (1, 2):
             known = cases.network(event, 3, 1, varied=False)
-            rows = cases.predicted(known, known.recorded, 2500, event)
+            rows = cases.predicted(known, known.recorded, 2500, event, linear)
             told.append(
                 rows.assign(pounded=cases.outcomes(rows, known.recorded, event), event=event)
             )

@@ -79,7 +79,9 @@ def test_two_scenarios_with_rates(tmp_path):
             (tmp_path / one).write_text(text, encoding="utf-8")
     with plain_reports():
         result = screen_scenarios(tmp_path / "workflows" / "ensemble.toml", executor=InProcess())
-    assert result.record["counts"] == {"pairs": 20, "rejected_pair": 0}
+    assert result.record["counts"] == {
+        "pairs": 20, "rejected_pair": 0, "unknown_gap": 0, "missing_scenario": 0
+    }  # fmt: skip
     table = pd.read_parquet(tmp_path / "output" / "ensemble" / "ensemble.parquet")
     # one year of 0.014 earthquakes, each of which some pairs do not survive, and pairs that touch
     # always meet in: only the digits of floating point are between both

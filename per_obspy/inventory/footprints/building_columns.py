@@ -51,7 +51,7 @@ FROM_OUTLINES = ("longitude", "latitude", "area", "geometry")
 RESULTS = (
     *("amplification", "amplification_exact", "contact_mass", "displacement_exact", "ductility"),
     "elastic_ratio",
-    *("ln_per_ratio", "ln_per_std", "per", "sd"),
+    *("ln_per_ratio", "ln_per_std", "per", "residual", "sd"),
 )
 
 #: Prefix of columns whose names are needed otherwise.

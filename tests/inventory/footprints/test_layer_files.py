@@ -35,7 +35,7 @@ def test_a_bomb_is_refused_before_it_fills_the_disk(tmp_path, monkeypatch):
     path = tmp_path / "a.csv.gz"
     path.write_bytes(gzip.compress(bytes(1 << 24)))
     with pytest.raises(CatalogError, match=r"a\.csv\.gz: it has more than .* split the file"):
-        layer_files._read(path, None)
+        layer_files._read(path, None, None, None)
 
 
 def test_a_bomb_is_refused_by_its_ratio(tmp_path):
