@@ -260,8 +260,7 @@ def _amplification_error(constants: FloatArray, rows: pd.DataFrame) -> FloatArra
     """Return the error of the amplification of a node over the size of the amplification."""
     change = rows["received"] * rows["harmonic"] * np.exp(-_loss(np.array(LOSSES), rows))
     strong = (1.0 + (constants[0] * change) ** 4) ** 0.25
-    weak = constants[1] * np.sqrt(change * (1.0 - rows["share"]))
-    error = strong + weak - rows["amplification"]
+    error = strong + constants[1] * np.sqrt(change) - rows["amplification"]
     return np.asarray(error / np.hypot(1.0, 0.7 * change))
 
 

@@ -22,7 +22,7 @@ equal oscillators from building up a relative motion at all: the velocity is les
 ``exp(-(LOSS sqrt(rho) + LOSS_BETWEEN rho (1 - rho)) (1 - g/D))`` with rho of eq. (16), over the
 larger ratio of PER to the yield displacement where a building yields in a record. The change
 of velocity dv of eq. (7) and (8), x being dv / (w r), amplifies a radius r by
-``(1 + (RADIUS_SHARE x)⁴)^(1/4) + WEAK_SHARE sqrt(x (1 - g/D))``. The constants are those of
+``(1 + (RADIUS_SHARE x)⁴)^(1/4) + WEAK_SHARE sqrt(x)``. The constants are those of
 ``kernels/pairs/node_outcomes.py``, fitted to exact histories in 10 events of real records;
 ``workflows/population_accuracy.py`` has their accuracy.
 

@@ -22,8 +22,8 @@ from per_obspy.kernels.vector_functions import (
 #: correlation is neither 0 nor 1, per their product.
 LOSS, LOSS_BETWEEN = 1.02, 0.53
 #: Share of the change of velocity that a strong impact adds to the radius, and growth of the radius
-#: per root of weak changes, of which there are fewer the wider the gap is.
-RADIUS_SHARE, WEAK_SHARE = 0.78, 0.172
+#: per root of a weak change.
+RADIUS_SHARE, WEAK_SHARE = 0.76, 0.145
 #: Share of the population that the quantile of the impact velocity is not below.
 QUANTILE = 0.84
 #: Demand / largest demand of the pair's nodes below which its logarithm does not count in the
@@ -57,7 +57,7 @@ def fill_outcomes(motion, facts, deviates, out):
         Receives the outcome.
     """
     count = deviates.shape[1]
-    # scale of the demand, gap and then its share of the demand, velocity, scratch
+    # scale of the demand, gap, velocity, scratch
     work = np.empty((4, count))
     integers = np.empty(count, np.int64)
     for pair in range(facts.shape[1]):
@@ -110,12 +110,12 @@ def fill_velocities(motion, scales, gaps, out):
 
 @kernel
 def _velocities(motion, work, integers):
-    """Fill the impact velocities of a pair, ``work[2]``; gaps become shares of the demand."""
+    """Fill the impact velocities of a pair, ``work[2]``, from scales and gaps before them."""
     for node in range(work.shape[1]):
         # share of the way that the gap leaves free; 1 without contact
         demand = work[0, node] * motion[DEMAND, node]
         gap = work[1, node]
-        work[1, node] = share = gap / demand if demand > gap else 1.0
+        share = gap / demand if demand > gap else 1.0
         work[2, node] = work[0, node] * motion[VELOCITY, node] * math.sqrt(1.0 - share * share)
         # earlier impacts of nearly equal oscillators
         alike = max(motion[CORRELATION, node], 0.0)
@@ -136,8 +136,7 @@ def _amplification(motion, work, node, fact):
     change_2 = fact[RECEIVED_2] * velocity / speed_2 if speed_2 > 0.0 else 0.0
     largest = max(change_1, change_2)
     strong = (RADIUS_SHARE * largest) ** 2
-    weak = WEAK_SHARE * math.sqrt(largest * (1.0 - work[1, node]))
-    return math.sqrt(math.sqrt(1.0 + strong * strong)) + weak
+    return math.sqrt(math.sqrt(1.0 + strong * strong)) + WEAK_SHARE * math.sqrt(largest)
 
 
 @kernel

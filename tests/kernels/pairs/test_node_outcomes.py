@@ -51,10 +51,9 @@ def _chance(demands, gap, known):
     return np.where(moving, chance, demands > gap[:, None]).mean(axis=1)
 
 
-def _grown(change, share):
+def _grown(change):
     """Return the amplification by a change of velocity over the speed of an oscillator."""
-    weak = WEAK_SHARE * np.sqrt(change * (1.0 - share))
-    return (1.0 + (RADIUS_SHARE * change) ** 4) ** 0.25 + weak
+    return (1.0 + (RADIUS_SHARE * change) ** 4) ** 0.25 + WEAK_SHARE * np.sqrt(change)
 
 
 def _definition(motion, facts, deviates):
@@ -83,7 +82,7 @@ def _definition(motion, facts, deviates):
             _chance(demand, facts[0], np.hypot(facts[1], facts[2])),
             impact.mean(axis=1),
             np.quantile(by_contact, QUANTILE, axis=1),
-            _grown(np.maximum(*changes), share).mean(axis=1),
+            _grown(np.maximum(*changes)).mean(axis=1),
         ]
     )
 
@@ -116,7 +115,7 @@ def test_both_buildings_are_symmetric_and_the_lighter_one_is_amplified():
     motion, turned = (0.2, 0.4, 0.6, 0.5, 0.0), (0.2, 0.4, 0.5, 0.6, 0.0)
     assert _amplification(motion, (1.2, 0.4)) == _amplification(turned, (0.4, 1.2)) > 1.0
     # equal changes: the slower building
-    expected = _grown(1.2 * 0.4 / 0.5, 0.0)
+    expected = _grown(1.2 * 0.4 / 0.5)
     assert_allclose(_amplification(motion, (1.2, 1.2)), expected, rtol=1e-12)
 
 
