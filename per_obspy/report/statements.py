@@ -243,7 +243,9 @@ def sureness(results: Results) -> list[str]:
     counts = {name: results.written(tally.states[name]) for name in states}
     said, whole = [texts["sure_states"].format(**counts)], results.written(tally.pairs)
     for flag, key in DOUBTS.items():
-        if count := tally.flags[flag]:
+        count = tally.flags[flag]
+        # Where nothing yields no pair ranks high because it cannot
+        if count and (tally.yielding or flag != "unknown_strength"):
             said.append(results.counted(key, count, all=whole))
     # The nearer the records, the surer the motion
     distance = tally.median_distance() / 1000.0
