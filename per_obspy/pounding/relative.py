@@ -245,7 +245,7 @@ def yielding_approach(
     Compute by how far and how fast structure 1 approaches 2 at most, if they do not touch.
 
     For populations of structures that yield: the same as `yielding_relative_displacement`, at the
-    samples and steps between them of 0.35 rad of the shorter period at most, in an eighth of its
+    samples and steps between them of 0.35 rad of the shorter period at most, in a small part of its
     time. Half of the displacements are exact to 2e-4, 99 % to 0.5 %.
 
     Parameters
