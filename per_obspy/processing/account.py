@@ -157,12 +157,22 @@ def copy_header(trace: Trace) -> Trace:
     below the lists and dictionaries of the header, such as ``stats.response``. Copies of a day of
     three components took gigabytes, those of the response a quarter of the whole chain.
     """
-    own = {
-        name: copy(value) if isinstance(value, AttribDict | list) else value
-        for name, value in trace.stats.items()
-        if name != "endtime"
-    }
-    return Trace(trace.data, own)
+    out = copy(trace)
+    out.stats = _copy_level(trace.stats)
+    values = vars(out.stats)
+    for name, value in values.items():
+        if type(value) is list:
+            values[name] = value.copy()
+        elif type(value) is AttribDict:
+            values[name] = _copy_level(value)
+    return out
+
+
+def _copy_level(header: AttribDict) -> AttribDict:
+    """Return a dictionary of its own with the same values; ObsPy checks each and derives others."""
+    out: AttribDict = object.__new__(type(header))
+    vars(out).update(vars(header))
+    return out
 
 
 def taken(stream: Stream) -> Iterator[Trace]:

@@ -20,7 +20,7 @@ from per_obspy.config import Processing
 from per_obspy.processing.account import FROM_CONSTANT, FROM_TABLE
 
 if TYPE_CHECKING:
-    from obspy.taup import TauPyModel
+    from obspy.taup.seismic_phase import SeismicPhase
 
 #: Velocity model of the Earth for travel times.
 MODEL = "iasp91"
@@ -94,18 +94,22 @@ def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
 def _p_arrival_at(latitude: float, longitude: float, source: Source) -> UTCDateTime | None:
     """Compute the arrival time of the first P wave at a place."""
     degrees = locations2degrees(source.latitude, source.longitude, latitude, longitude)
-    kilometres = source.depth / METRES_PER_KILOMETRE
-    arrivals = _model().get_travel_times(kilometres, degrees, phase_list=["ttp"])
-    return source.time + arrivals[0].time if arrivals else None
+    phases = _phases_from(source.depth / METRES_PER_KILOMETRE)
+    times = [arrival.time for phase in phases for arrival in phase.calc_time(degrees)]
+    return source.time + min(times) if times else None
 
 
-@lru_cache(maxsize=1)
-def _model() -> "TauPyModel":
-    """Return the velocity model, loaded once."""
+@lru_cache(maxsize=4)
+def _phases_from(kilometres: float) -> "list[SeismicPhase]":
+    """Return the phases of P from a depth: the model is split there once for all stations."""
     # ObsPy's travel times load Matplotlib too: a quarter of the time in which a worker begins
     from obspy.taup import TauPyModel
+    from obspy.taup.taup_time import TauPTime
 
-    return TauPyModel(MODEL)
+    work = TauPTime(TauPyModel(MODEL).model, ["ttp"], kilometres, 0.0)
+    work.depth_correct(kilometres)
+    work.recalc_phases()
+    return list(work.phases)
 
 
 def first_wave(

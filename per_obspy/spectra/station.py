@@ -119,7 +119,7 @@ def peak_motions(trace: Trace) -> tuple[float, float]:
     return float(np.abs(trace.data).max()), float(np.abs(velocity).max())
 
 
-def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
+def record_facts(stream: Stream, horizontals: list[Trace]) -> dict[str, Variable]:
     """
     Describe the records of a station by texts: sources, instrument, level, warnings and flags.
 
@@ -140,10 +140,9 @@ def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
         "notes": _remarks(stream, "notes"),
         **_place_facts(horizontals),
     }
-    variables: dict[str, Variable] = {}
-    for name, text in texts.items():
-        variables[name] = ((), printable(text), {"long_name": MEANINGS[name]})
-    return xr.Dataset(variables)
+    return {
+        name: ((), printable(text), {"long_name": MEANINGS[name]}) for name, text in texts.items()
+    }
 
 
 def _place_facts(horizontals: list[Trace]) -> dict[str, str]:
@@ -267,17 +266,22 @@ def station_spectra(
     motion, azimuths = _horizontal_motion(horizontals)
 
     # Spectra by component and by azimuth, the motion, and the usable periods
-    parts = [
-        _component_spectra(traces, grid, damping),
-        _azimuthal_spectra(motion, horizontals[0].stats.delta, grid, damping, azimuth_step),
-        _motion(motion, azimuths, horizontals[0]),
-        _usable(horizontals, grid),
-        record_facts(stream, horizontals),
-    ]
-    dataset = xr.merge(parts)
-    for variable in dataset.data_vars.values():
+    place = place_of(horizontals[0])
+    variables = {
+        **_component_spectra(traces, grid, damping),
+        **_azimuthal_spectra(motion, horizontals[0].stats.delta, grid, damping, azimuth_step),
+        **_motion(motion, azimuths, horizontals[0]),
+        **place,
+        **_usable(horizontals, grid),
+        **record_facts(stream, horizontals),
+    }
+    # One Dataset of all: to join several takes as long as some spectra
+    dataset = xr.Dataset(variables, attrs=_attributes(horizontals))
+    dataset = dataset.set_coords(["component_name", *place])
+    for name in dataset.data_vars:
+        variable = dataset.variables[name]
         variable.attrs["coverage_content_type"] = _content_type(variable)
-    return dataset.assign_attrs(_attributes(horizontals))
+    return dataset
 
 
 def _grid(periods: ArrayLike | None) -> FloatArray:
@@ -362,7 +366,7 @@ def _check_match(first: Trace, second: Trace) -> None:
 
 def _component_spectra(
     traces: dict[str, Trace], periods: FloatArray, dampings: FloatArray
-) -> xr.Dataset:
+) -> dict[str, Variable]:
     spectra = [
         response_spectra(trace.data, trace.stats.delta, periods, dampings)
         for trace in traces.values()
@@ -376,7 +380,7 @@ def _component_spectra(
     per = [spectrum.per for spectrum in spectra]
     sd = [spectrum.sd for spectrum in spectra]
     sa = [spectrum.sa for spectrum in spectra]
-    variables = {
+    return _axes(list(traces), periods, dampings) | {
         "per": _by_component(per, "m", "pseudo energy radius"),
         "sd": _by_component(sd, "m", "spectral displacement"),
         "sa": _by_component(sa, "m s-2", "absolute spectral acceleration"),
@@ -389,7 +393,6 @@ def _component_spectra(
             {"long_name": "processing steps of the record and every number chosen for it, as JSON"},
         ),
     }
-    return xr.Dataset(variables, coords=_axes(list(traces), periods, dampings))
 
 
 def _by_component(spectra: list[FloatArray], units: str, title: str) -> Variable:
@@ -420,19 +423,19 @@ def _processing_record(trace: Trace) -> str:
 
 def _azimuthal_spectra(
     motion: FloatArray, dt: float, periods: FloatArray, dampings: FloatArray, step: int
-) -> xr.Dataset:
+) -> dict[str, Variable]:
     """Return PER and SD by azimuth with their percentiles; no variables for one horizontal."""
     if len(motion) == 1:
-        return xr.Dataset()
+        return {}
     north, east = motion
     # Every degree for the percentiles, of which the stored azimuths are a part
     per, sd = azimuthal_spectra(north, east, dt, periods, dampings, EVERY_AZIMUTH)
     azimuth = {"units": "degree", "long_name": "azimuth, clockwise from north"}
-    return xr.Dataset(
-        _by_azimuth("per", per, "pseudo energy radius", step)
-        | _by_azimuth("sd", sd, "spectral displacement", step),
-        coords={"azimuth": ("azimuth", EVERY_AZIMUTH[::step], azimuth)},
-    )
+    return {
+        "azimuth": ("azimuth", EVERY_AZIMUTH[::step], azimuth),
+        **_by_azimuth("per", per, "pseudo energy radius", step),
+        **_by_azimuth("sd", sd, "spectral displacement", step),
+    }
 
 
 def _by_azimuth(name: str, values: FloatArray, title: str, step: int) -> dict[str, Variable]:
@@ -453,7 +456,7 @@ def _by_azimuth(name: str, values: FloatArray, title: str, step: int) -> dict[st
     return variables
 
 
-def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Dataset:
+def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> dict[str, Variable]:
     azimuth = {
         "units": "degree",
         "long_name": "azimuth of the motion, clockwise from north; missing if unknown",
@@ -468,21 +471,16 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
     }
     # Time is relative to the start, so that it is exact
     seconds = np.arange(motion.shape[1]) * trace.stats.delta
-    return xr.Dataset(
-        {
-            "acceleration": (
-                ("horizontal", "time"),
-                motion,
-                {"units": "m s-2", "long_name": "processed ground acceleration"},
-            ),
-            "horizontal_azimuth": ("horizontal", azimuths, azimuth),
-            "sampling_interval": ((), trace.stats.delta, interval),
-        },
-        coords={"time": ("time", seconds, time), **place_of(trace)},
-    )
+    acceleration = {"units": "m s-2", "long_name": "processed ground acceleration"}
+    return {
+        "acceleration": (("horizontal", "time"), motion, acceleration),
+        "horizontal_azimuth": ("horizontal", azimuths, azimuth),
+        "sampling_interval": ((), trace.stats.delta, interval),
+        "time": ("time", seconds, time),
+    }
 
 
-def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
+def _usable(horizontals: list[Trace], periods: FloatArray) -> dict[str, Variable]:
     """Return the limits of the periods that every horizontal supports, and a flag per period."""
     limits = [trace.stats.get("per_obspy", {}) for trace in horizontals]
     shortest = max(float(limit.get("shortest_period", 0.0)) for limit in limits)
@@ -496,16 +494,14 @@ def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
     }
     lower = {"units": "s", "long_name": "shortest usable period"}
     upper = {"units": "s", "long_name": "longest usable period"}
-    return xr.Dataset(
-        {
-            "usable": ("period", usable, flags),
-            "shortest_usable_period": ((), shortest, lower),
-            "longest_usable_period": ((), longest, upper),
-        }
-    )
+    return {
+        "usable": ("period", usable, flags),
+        "shortest_usable_period": ((), shortest, lower),
+        "longest_usable_period": ((), longest, upper),
+    }
 
 
-def _content_type(variable: xr.DataArray) -> str:
+def _content_type(variable: xr.Variable) -> str:
     """Return the kind of content in the words of ISO 19115-1, which ACDD asks for."""
     if "flag_values" in variable.attrs:
         return "qualityInformation"

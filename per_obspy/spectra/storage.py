@@ -6,7 +6,7 @@ region contains the spectra of all stations along the dimension ``station`` with
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from pathlib import Path
 
 import netCDF4
@@ -29,34 +29,40 @@ FEWEST_COMPRESSED = 1000
 
 def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     """Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all."""
+    # As CF asks for: coordinates that are no axes are named by each variable that has them
+    coordinates = set(dataset.coords)
+    places = {
+        str(name): {*dataset.variables[name].dims}
+        for name in sorted(coordinates - set(dataset.dims), key=str)
+    }
     with written_whole(path) as part, netCDF4.Dataset(part, "w") as file:
         file.setncatts(dataset.attrs)
+        for axis, size in dataset.sizes.items():
+            file.createDimension(str(axis), size)
         for name in [*dataset.data_vars, *dataset.coords]:
-            _write_variable(file, dataset, str(name))
+            _write_variable(
+                file, str(name), dataset.variables[name], None if name in coordinates else places
+            )
 
 
-def _write_variable(file: netCDF4.Dataset, dataset: xr.Dataset, name: str) -> None:
-    """Write a variable with its axes and attributes."""
-    variable, is_data = dataset.variables[name], name in dataset.data_vars
-    axes = [str(axis) for axis in variable.dims]
-    for axis in axes:
-        if axis not in file.dimensions:
-            file.createDimension(axis, dataset.sizes[axis])
+def _write_variable(
+    file: netCDF4.Dataset,
+    name: str,
+    variable: xr.Variable,
+    places: dict[str, set[Hashable]] | None,
+) -> None:
+    """Write a variable with its attributes; data name those of the places whose axes they have."""
     is_text = variable.dtype.kind not in "fi"
     stored = file.createVariable(
         name,
         str if is_text else variable.dtype,
-        axes,
-        fill_value=np.nan if variable.dtype.kind == "f" and is_data else None,
+        variable.dims,
+        fill_value=np.nan if variable.dtype.kind == "f" and places is not None else None,
         # Processed samples take as much space compressed, and twice the time
         zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
     )
-    stored.setncatts(variable.attrs)
-    # As CF asks for: coordinates that are no axes are named by each variable that has them
-    places = sorted(str(place) for place in dataset.coords if place not in dataset.dims)
-    own = [place for place in places if {*dataset.variables[place].dims} <= {*axes}]
-    if own and is_data:
-        stored.coordinates = " ".join(own)
+    own = [place for place, axes in (places or {}).items() if axes <= {*variable.dims}]
+    stored.setncatts(variable.attrs | ({"coordinates": " ".join(own)} if own else {}))
     stored[...] = variable.values.astype(object) if is_text else variable.values
 
 

@@ -43,7 +43,7 @@ from per_obspy.processing.filter.baseline_spread import (
     longest_certain_period,
     without_drift,
 )
-from per_obspy.processing.filter.butterworth import butterworth_amplitude, taper, thin_spectrum
+from per_obspy.processing.filter.butterworth import taper, thin_spectrum
 from per_obspy.processing.signal_to_noise import (
     NoiseSpectra,
     clear_band,
@@ -299,9 +299,11 @@ def displacement_drift(
     spectrum = -spectrum / (angular**2 * thin)
     count = acceleration.size // thin
     basis = _polynomial_basis(count)
+    # Power of the Butterworth amplitude that is the same for every corner
+    slopes = angular ** (-2 * order)
 
     def drift(highpass: float) -> float:
-        amplitude = butterworth_amplitude(frequencies, highpass, np.inf, order)
+        amplitude = 1 / np.sqrt(1 + slopes * (2 * np.pi * highpass) ** (2 * order))
         displacement = irfft(spectrum * amplitude, points)
         # Least-squares polynomial over the record without its pads
         record = displacement[first : first + count]
