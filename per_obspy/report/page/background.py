@@ -346,6 +346,5 @@ def _packed(lines: Shapes) -> list[list[int]]:
     steps = np.diff(whole, axis=0, prepend=0)
     steps[is_first] = whole[is_first]
     kept = is_first | steps.any(axis=1)
-    steps, line = steps[kept], line[kept]
-    starts = np.flatnonzero(np.concatenate([[True], line[1:] != line[:-1]]))
-    return [part.ravel().tolist() for part in np.split(steps, starts[1:])]
+    starts = np.flatnonzero(is_first[kept])
+    return [part.ravel().tolist() for part in np.split(steps[kept], starts[1:])]
