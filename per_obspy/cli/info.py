@@ -2,7 +2,6 @@
 
 import json
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,7 +81,8 @@ def info(
         for line in screen_of(path, found, len(few) + (len(few) < len(rejected))):
             print(line)
         if everything and found.kind == "records":
-            _print_records(found.values["records"])
+            records = found.values["records"]
+            print_table(f"{len(records)} records", SHOWN, map(_cells, records))
         print_rejected(few, len(rejected), None if everything else WIDTH)
     stop_if_nothing(int(found.usable))
 
@@ -136,11 +136,6 @@ def _wrapped(found: "Description", label: str, text: str) -> list[str]:
         lines[MOST_LINES - 1 :] = [shortened(" ".join(lines[MOST_LINES - 1 :]), WIDTH - width - 4)]
     labels = [shortened(label, LONGEST_LABEL), *[""] * (len(lines) - 1)]
     return [f"  {one:<{width}}  {line}" for one, line in zip(labels, lines, strict=True)]
-
-
-def _print_records(records: Sequence[dict[str, Any]]) -> None:
-    """Print every record as a row of a table."""
-    print_table(f"{len(records)} records", SHOWN, [_cells(record) for record in records])
 
 
 def _cells(record: dict[str, Any]) -> list[object]:

@@ -235,27 +235,26 @@ def spectra(
     files = [str(output)] if shards else []
     for shard in shards if plot else []:
         files += map(str, plot_station(shard, PLOT_DAMPING, plot_period, output.parent))
-    if quiet and not as_json:
-        stop_if_nothing(len(shards))
-        return
-    _print_stations(len(shards), rejected, files, output.with_suffix(".rejected.csv"), as_json)
+    if not as_json:
+        files = [str(output.with_suffix(".rejected.csv")), *files]
+    _print_stations({"stations": len(shards)}, rejected, files, as_json, quiet)
 
 
 def _print_stations(
-    stations: int,
+    counts: "Mapping[str, int]",
     rejected: "Sequence[Rejection]",
     files: "Sequence[str]",
-    reasons: Path,
     as_json: bool,
+    quiet: bool,
 ) -> None:
     """Print the number of stations, the rejected ones and the files; stop if no station is left."""
     if as_json:
         rows = [rejection._asdict() for rejection in rejected]
-        print(json.dumps({"stations": stations, "rejected": rows, "files": files}))
-    else:
-        counts = f"{number_of(stations, 'station')}, {len(rejected)} rejected"
-        print(counts, reasons, *files, sep="\n  ")
-    stop_if_nothing(stations)
+        print(json.dumps({**counts, "rejected": rows, "files": files}))
+    elif not quiet:
+        named = f"{number_of(counts['stations'], 'station')}, {len(rejected)} rejected"
+        print(named, *files, sep="\n  ")
+    stop_if_nothing(counts["stations"])
 
 
 def process(
@@ -292,17 +291,9 @@ def process(
 
     # Print counts and files, for machines or people
     stations = sum(station.shard is not None for station in result.done)
+    counts = {"stations": stations, "resumed": sum(station.resumed for station in result.done)}
     files = [str(path) for path in result.files]
-    if as_json:
-        rows = [rejection._asdict() for rejection in result.rejected]
-        resumed = sum(station.resumed for station in result.done)
-        counts = {"stations": stations, "resumed": resumed}
-        print(json.dumps({**counts, "rejected": rows, "files": files}))
-    elif not quiet:
-        print(
-            f"{number_of(stations, 'station')}, {len(result.rejected)} rejected", *files, sep="\n  "
-        )
-    stop_if_nothing(stations)
+    _print_stations(counts, result.rejected, files, as_json, quiet)
 
 
 def print_nothing(result: "Result") -> None:

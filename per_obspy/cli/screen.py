@@ -190,9 +190,11 @@ def _spectrum_table(
 
 def _end_design(design: Screened, as_json: bool, quiet: bool) -> None:
     """Print the result of a screening by a spectrum, and stop without a usable pair."""
+    from per_obspy.config.screening import EVERY_STATE
+
     table, coverage, files, alert = design
     # Print the counts, for machines or with the worst pairs
-    counts = _state_counts(table)
+    counts = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
     rejected = len(table.attrs["rejected"])
     if as_json:
         names = [str(path) for path in files]
@@ -233,13 +235,6 @@ def _coverage(settings: "Design", table: "pd.DataFrame") -> "Coverage":
     for block in checked_file(settings.pairs).rows(ALL) if rejected else ():
         tally.add((), areas_left_out(settings.totals, rejected, block))
     return tally.coverage({"pairs": len(table), "rejected_pair": len(rejected)})
-
-
-def _state_counts(table: "pd.DataFrame") -> dict[str, int]:
-    """Return the number of pairs in each state."""
-    from per_obspy.screening.ranking import EVERY_STATE
-
-    return {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
 
 
 def _print_spectrum_result(

@@ -10,6 +10,7 @@ from per_obspy.formats.text.header import (
     CLOCK,
     epicentre_place,
     header_time,
+    moment_first,
     number_in,
     place_pattern,
     scale,
@@ -117,11 +118,9 @@ def _station(lines: list[str], epicentre: Words) -> Words:
 def _event(text: Text, first: int, lines: list[str]) -> Words:
     """Return origin time, hypocentre and magnitude (moment, or else the first) of the event."""
     epicentre = _EPICENTRE.match(lines[8])
-    # Kinds of magnitude in the order of the line
-    magnitudes = {kind: float(size) for kind, size in _MAGNITUDE.findall(lines[8])}
     return {
         "time": header_time(text, first + 2, "origin time", _TIME.match(lines[2])),
         **epicentre_place(epicentre),
         "depth": scale(number_in(epicentre, "depth"), 1000),
-        "magnitude": magnitudes.get("Mw", next(iter(magnitudes.values()), None)),
+        "magnitude": moment_first(_MAGNITUDE.findall(lines[8])),
     }

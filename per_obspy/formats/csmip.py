@@ -17,6 +17,7 @@ from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.formats.text.header import (
     epicentre_place,
     header_time,
+    moment_first,
     number_in,
     place_pattern,
     scale,
@@ -290,16 +291,13 @@ def _event(text: Text, first: int, lines: list[str]) -> Words:
     """Return name, origin time, hypocentre and magnitude of the event."""
     epicentre = epicentre_place(_EPICENTRE.search(lines[8]))
     depth = scale(number_in(_DEPTH.search(lines[8])), 1000)
-    # Moment magnitude, or else the first that is above zero
-    sizes = [(kind, float(size)) for kind, size in _MAGNITUDE.findall(lines[8])]
-    magnitudes = {kind: size for kind, size in sizes if size > 0}
     # A depth without an epicentre is a mark for unknown
     return {
         "name": None if lines[1].startswith(_RECORD_OF) else lines[1].strip(),
         "time": _clock(text, first + 2, _ORIGIN.search(lines[2])),
         **epicentre,
         "depth": depth if epicentre else None,
-        "magnitude": magnitudes.get("MW", next(iter(magnitudes.values()), None)),
+        "magnitude": moment_first(_MAGNITUDE.findall(lines[8])),
     }
 
 

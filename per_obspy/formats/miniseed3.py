@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.errors import MissingExtra, RecordRejected, require_extra
-from per_obspy.formats.text.lines import WaveformFile, head
+from per_obspy.formats.text.lines import WaveformFile, head, named_content, write_content
 
 #: Start of every record: letters and version.
 _START = b"MS\x03"
@@ -82,10 +82,7 @@ def read_miniseed3(file: WaveformFile, headonly: bool = False, **_unused: Any) -
     RecordRejected
         If a record is damaged, has no FDSN source identifier, or the file holds texts alone.
     """
-    if hasattr(file, "read"):
-        name, content = str(getattr(file, "name", "open file")), file.read()
-    else:
-        name, content = str(file), Path(file).read_bytes()
+    name, content = named_content(file)
     # Records of several channels alternate in most files
     runs: list[list[_Record]] = []
     last: dict[_Kind, list[_Record]] = {}
@@ -214,11 +211,7 @@ def write_miniseed3(
     records = [
         record for trace in stream for record in _packed(library, trace, encoding, record_length)
     ]
-    content = b"".join(records)
-    if hasattr(filename, "write"):
-        filename.write(content)
-    else:
-        Path(filename).write_bytes(content)
+    write_content(filename, b"".join(records))
 
 
 def _packed(

@@ -26,6 +26,7 @@ from per_obspy.formats.text.lines import (
     quote,
     read_text,
     refuse,
+    write_content,
 )
 from per_obspy.formats.text.vocabulary import Words, channel_code, orientation, trace
 
@@ -134,11 +135,7 @@ def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -
     """
     if len(stream) != 1:
         raise ValueError(f"an AT2 file holds one trace, got {len(stream)}")
-    content = _at2_text(stream[0]).encode("ascii", "replace")
-    if hasattr(filename, "write"):
-        filename.write(content)
-    else:
-        Path(filename).write_bytes(content)
+    write_content(filename, _at2_text(stream[0]).encode("ascii", "replace"))
 
 
 def _at2_text(component: Trace) -> str:

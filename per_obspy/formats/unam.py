@@ -18,6 +18,7 @@ from per_obspy.formats.text.header import (
     HeaderField,
     epicentre_place,
     first_known,
+    moment_first,
     scale,
     station_place,
 )
@@ -214,7 +215,7 @@ def _common_words(header: Header) -> Words:
         "time": origin,
         **epicentre_place(_place(header, "COORDENADAS DEL EPICENTRO")),
         "depth": scale(depth, 1000),
-        "magnitude": _magnitude(header),
+        "magnitude": moment_first(_MAGNITUDE.findall(header.word("MAGNITUD(ES)") or "")),
     }
     # The format has no network codes
     site = _place(header, "COORDENADAS DE LA ESTACION")
@@ -235,10 +236,3 @@ def _place(header: Header, name: str) -> re.Match[str] | None:
     """Return latitude and longitude from the two lines of a field."""
     lines = (header.word(name) or "", header.word(f"{name} 2") or "")
     return _PLACE.match("\n".join(lines).upper())
-
-
-def _magnitude(header: Header) -> float | None:
-    """Return the first moment magnitude, or else the first of any kind."""
-    magnitudes = _MAGNITUDE.findall(header.word("MAGNITUD(ES)") or "")
-    moment = [size for kind, size in magnitudes if kind == "Mw"]
-    return first_known(map(float, [*moment, *(size for _, size in magnitudes)]))

@@ -8,7 +8,7 @@ known is NaN.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from per_obspy.checks import FloatArray
 
@@ -87,12 +87,3 @@ def floor_offset(
     storey = np.where(first >= second, first / storeys_1, second / storeys_2)
     nearest = np.maximum(np.rint(lower / storey), 1.0)
     return np.asarray(np.abs(lower - nearest * storey))
-
-
-def floors_misaligned(offset: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
-    """
-    Return where a floor offset (m) exceeds the tolerance (m).
-
-    Floors of one building may then hit columns of the other, which is outside the method.
-    """
-    return np.asarray(np.abs(offset) > tolerance)

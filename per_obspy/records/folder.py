@@ -23,6 +23,7 @@ from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Reject
 from per_obspy.files import bytes_hash
 from per_obspy.formats.text.station_table import bare_name, located_stations
 from per_obspy.machine import raise_machine_fault
+from per_obspy.processing.account import rejection as trace_row
 from per_obspy.processing.account import taken
 from per_obspy.records.archive import LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.earthquake import Earthquake
@@ -61,11 +62,6 @@ _INTEGRALS = {"m/s": "velocity", "m": "displacement"}
 def station_name(trace: Trace) -> str:
     """Return ``"NET.STA"`` of a trace."""
     return f"{trace.stats.network}.{trace.stats.station}"
-
-
-def trace_row(trace: Trace, *reasons: str) -> Rejection:
-    """Return the row of a trace that is not used."""
-    return Rejection("record", trace.id, str(trace.stats.source), None, reasons)
 
 
 def read_station(

@@ -186,7 +186,10 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
         raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
     for path in paths:
         try:
-            metadata = _read_inventory(path)
+            content = read_file(path)
+            # StationXML, whatever else the file may be
+            is_text = kind_of(path, content) == "station text"
+            metadata = read_metadata("station text" if is_text else "inventory", path, content)
         except RecordRejected as rejection:
             problem = f"is no StationXML: {'; '.join(rejection.reasons)}"
             raise CatalogError(rejection.record, problem) from rejection
@@ -195,13 +198,6 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
             log.warning("%s: lines left out: %s", path, shortened("; ".join(metadata.faults)))
         inventories.append(metadata.inventory)
     return inventories
-
-
-def _read_inventory(path: Path) -> Metadata:
-    """Read StationXML or FDSN station text, whatever else the file may be."""
-    content = read_file(path)
-    is_text = kind_of(path, content) == "station text"
-    return read_metadata("station text" if is_text else "inventory", path, content)
 
 
 def merged_inventory(inventories: Sequence[Inventory]) -> Inventory | None:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 from obspy import Trace
 
 from per_obspy.errors import Rejection
+from per_obspy.processing.account import rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf
 from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, peak_motion, record_span
-from per_obspy.records.folder import find_stations, trace_row
+from per_obspy.records.folder import find_stations
 
 #: Columns that are words of ``trace.stats``.
 _SAME_WORDS = (
@@ -121,7 +122,7 @@ def describe_records(
     for name, paths in found.stations.items():
         stream, unread = found.reader(paths, found.inventory, name)
         rejected += unread
-        rejected += [trace_row(one, "it has no samples") for one in stream if not one.stats.npts]
+        rejected += [rejection(one, "it has no samples") for one in stream if not one.stats.npts]
         for trace in (one for one in stream if one.stats.npts):
             records.append(_described(trace, root))
             spans.append(record_span(trace, Path(trace.stats.source)))

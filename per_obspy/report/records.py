@@ -157,8 +157,7 @@ def _draw_noise(axes: Axes, unfiltered: FloatArray, dt: float, noise: float, low
     frequency, signal = spectra.frequencies[known], spectra.signal[known]
     # In the colours of the record and of the noise window
     axes.loglog(frequency, signal, color=BUILDING_COLOURS[0], label="signal before the filter")
-    colour = NOISE_COLOUR
-    axes.loglog(frequency, spectra.noise[known], color=colour, label="noise")
+    axes.loglog(frequency, spectra.noise[known], color=NOISE_COLOUR, label="noise")
 
 
 def _write_numbers(axes: Axes, processed: Any) -> None:

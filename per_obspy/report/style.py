@@ -135,15 +135,7 @@ def save(
     # Room below the axes for the note
     if simulated:
         figure.set_layout_engine("constrained", rect=(0.0, 0.05, 1.0, 0.95))
-        figure.text(
-            0.99,
-            0.01,
-            note,
-            ha="right",
-            va="bottom",
-            fontsize=9,
-            color="#AA0000",
-        )
+        figure.text(0.99, 0.01, note, ha="right", va="bottom", fontsize=9, color="#AA0000")
     # Axes are arranged once, not once for the titles and again for the file
     engine = figure.get_layout_engine()
     if engine is not None:

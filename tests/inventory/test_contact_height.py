@@ -9,7 +9,6 @@ from per_obspy.inventory.contact_height import (
     contact_participation,
     effective_mass_ratio,
     floor_offset,
-    floors_misaligned,
 )
 
 STOREYS = np.array([1, 2, 3, 5, 10])
@@ -70,10 +69,6 @@ def test_floor_offset_does_not_depend_on_the_order():
 def test_ground_is_no_floor_to_hit():
     # a 1.4 m wall next to storeys of 3 m is 1.6 m below the first floor, not 1.4 m above ground
     assert_allclose(floor_offset(1.4, 1, 9.0, 3), 1.6, rtol=1e-14)
-
-
-def test_misaligned_beyond_the_tolerance_in_either_direction():
-    assert floors_misaligned([0.6, -0.62, 0.62], 0.61).tolist() == [False, True, True]
 
 
 def test_one_storey_is_an_oscillator():

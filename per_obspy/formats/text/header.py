@@ -159,6 +159,17 @@ def first_known(numbers: Iterable[float | None]) -> float | None:
     return next((number for number in numbers if number is not None), None)
 
 
+def moment_first(sizes: Iterable[tuple[str, str]]) -> float | None:
+    """
+    Return the moment magnitude of kinds and sizes, or else the first; none is 0, an unknown one.
+
+    >>> moment_first([("ML", "6.1"), ("Mw", "6.3")]), moment_first([("Mw", "0"), ("ML", "5")])
+    (6.3, 5.0)
+    """
+    known = [(kind.upper() != "MW", float(size)) for kind, size in sizes if float(size) > 0]
+    return min(known, key=lambda size: size[0])[1] if known else None
+
+
 def corners(match: Match[str] | None, first: int = 1) -> dict[str, float]:
     """
     Return the corners of a filter from two groups of a match, Hz; empty where there is none.

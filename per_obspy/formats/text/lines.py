@@ -72,6 +72,21 @@ def head_lines(file: WaveformFile, size: int) -> list[str]:
     return _lines(head(file, size))
 
 
+def named_content(file: WaveformFile) -> tuple[str, bytes]:
+    """Return the name of a file, which may be open, and its content."""
+    if hasattr(file, "read"):
+        return str(getattr(file, "name", "open file")), file.read()
+    return str(file), Path(file).read_bytes()
+
+
+def write_content(file: WaveformFile, content: bytes) -> None:
+    """Write the content of a file, which may be open."""
+    if hasattr(file, "write"):
+        file.write(content)
+    else:
+        Path(file).write_bytes(content)
+
+
 def read_text(file: WaveformFile) -> Text:
     """
     Read a file as lines.
@@ -79,10 +94,7 @@ def read_text(file: WaveformFile) -> Text:
     Any line end is understood. The encoding is Latin-1, which every byte is. Padding after the last
     line is dropped. A line of more than ``LONGEST_LINE`` characters is refused.
     """
-    if hasattr(file, "read"):
-        name, content = str(getattr(file, "name", "open file")), file.read()
-    else:
-        name, content = str(file), Path(file).read_bytes()
+    name, content = named_content(file)
     # A byte ends the last word of a whole file; zeros may fill a place that was never cut
     padding = content[len(content.rstrip(_PADDING)) :]
     text = Text(name, _lines(content), bool(padding.strip(b"\x00")))

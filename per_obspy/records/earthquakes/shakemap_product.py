@@ -160,7 +160,12 @@ def _chosen(
     maps = _maps(url, content)
     if not maps or version is None:
         return maps[0] if maps else None
-    return _of_version(url, maps, version)
+    versions: dict[str, Mapping[str, Any]] = {_version(one): one for one in reversed(maps)}
+    if version not in versions:
+        listed = ", ".join(sorted(versions, key=int))
+        problem = f"has no version {version} of the ShakeMap, only {listed}"
+        raise CatalogError(public_url(url), problem)
+    return versions[version]
 
 
 def _maps(url: str, content: bytes) -> list[Mapping[str, Any]]:
@@ -179,15 +184,6 @@ def _version(product: Mapping[str, Any]) -> str:
     """Return the number of a map's version; digits alone, because it names a folder."""
     number = str(product.get("properties", {}).get("version", ""))
     return number if number.isdecimal() and len(number) < 6 else "0"
-
-
-def _of_version(url: str, maps: list[Mapping[str, Any]], version: str) -> Mapping[str, Any]:
-    """Return the map of a version."""
-    for one in maps:
-        if _version(one) == version:
-            return one
-    listed = ", ".join(sorted({_version(one) for one in maps}, key=int))
-    raise CatalogError(public_url(url), f"has no version {version} of the ShakeMap, only {listed}")
 
 
 def _address(product: Mapping[str, Any], member: str) -> str:

@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -15,7 +14,6 @@ import pyogrio
 import shapely
 from numpy.typing import NDArray
 
-from per_obspy.checks import FloatArray
 from per_obspy.errors import printable
 from per_obspy.report.layers.kml import BOTH_PLACES, has_both_places
 
@@ -29,7 +27,7 @@ def pair_shapes(table: pd.DataFrame) -> Shapes:
     Lines across the date line go on beyond 180 degrees, instead of around the Earth.
     """
     if not has_both_places(table.columns):
-        return points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
+        return points(table)
     east_1, north_1, east_2, north_2 = (table[name].to_numpy(float) for name in BOTH_PLACES)
     # Beyond the date line
     east_2 = east_2 - 360.0 * np.round((east_2 - east_1) / 360.0)
@@ -38,8 +36,9 @@ def pair_shapes(table: pd.DataFrame) -> Shapes:
     return lines
 
 
-def points(longitude: FloatArray, latitude: FloatArray) -> Shapes:
-    """Return points; None where a coordinate is unknown."""
+def points(table: pd.DataFrame) -> Shapes:
+    """Return the places of rows as points; None where a coordinate is unknown."""
+    longitude, latitude = (table[name].to_numpy(float) for name in ("longitude", "latitude"))
     known = np.isfinite(longitude) & np.isfinite(latitude)
     shapes: Shapes = shapely.points(longitude, latitude)
     shapes[~known] = None
@@ -69,7 +68,9 @@ class GeoParquet:
         rows = with_shapes(table, shapes, PARQUET_GEOMETRY)
         if self._writer is None:
             # Without a reference system coordinates are longitude and latitude, WGS 84
-            column = {"encoding": "WKB", "geometry_types": _types(shapes)}
+            # No types mean that they are unknown
+            kinds = [geometry_type(shapes)] if shapely.is_geometry(shapes).any() else []
+            column = {"encoding": "WKB", "geometry_types": kinds}
             geo = {
                 "version": VERSION,
                 "primary_column": PARQUET_GEOMETRY,
@@ -82,19 +83,9 @@ class GeoParquet:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._writer is not None:
             self._writer.close()
-
-
-def _types(shapes: Shapes) -> list[str]:
-    """Return the types of the shapes; none means that they are unknown."""
-    return [geometry_type(shapes)] if shapely.is_geometry(shapes).any() else []
 
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.

@@ -15,6 +15,16 @@ INSPECTIONS, MOST = "inspections", 1000
 CONTACTS = ("yes", "no", "unsure")
 DAMAGES = ("none", "local", "severe")
 
+#: Fields that are no plain text -> how they are asked; half a centimetre is what a tape tells.
+_WIDGETS: Mapping[str, tuple[str, dict[str, str]]] = {
+    "gap": (
+        "Range",
+        {"Min": "0", "Max": "10", "Step": "0.005", "Precision": "3", "AllowNull": "true"},
+    ),
+    "photo": ("ExternalResource", {"DocumentViewer": "1", "RelativeStorage": "1"}),
+    "inspected_at": ("DateTime", {"allow_null": "true", "calendar_popup": "true"}),
+}
+
 #: Field -> its question.
 QUESTIONS = {
     "pair_id": "pair",
@@ -54,8 +64,7 @@ def inspection_layer(pairs: pd.DataFrame) -> Layer:
             "note": text,
         }
     )
-    places = pairs["longitude"].to_numpy(float), pairs["latitude"].to_numpy(float)
-    return Layer(INSPECTIONS, table, points(*places))
+    return Layer(INSPECTIONS, table, points(pairs))
 
 
 def add_form(root: ElementTree.Element) -> None:
@@ -65,22 +74,8 @@ def add_form(root: ElementTree.Element) -> None:
     for name in QUESTIONS:
         if name in choices:
             _add_choices(fields, name, choices[name])
-        elif name == "gap":
-            # Half a centimetre is what a tape tells
-            _add_widget(
-                fields,
-                name,
-                "Range",
-                {"Min": "0", "Max": "10", "Step": "0.005", "Precision": "3", "AllowNull": "true"},
-            )
-        elif name == "photo":
-            _add_widget(
-                fields, name, "ExternalResource", {"DocumentViewer": "1", "RelativeStorage": "1"}
-            )
-        elif name == "inspected_at":
-            _add_widget(fields, name, "DateTime", {"allow_null": "true", "calendar_popup": "true"})
         else:
-            _add_widget(fields, name, "TextEdit", {})
+            _add_widget(fields, name, *_WIDGETS.get(name, ("TextEdit", {})))
     # What the run gave stays as it is
     editable = ElementTree.SubElement(root, "editable")
     for name in QUESTIONS:

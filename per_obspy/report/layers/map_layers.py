@@ -117,16 +117,15 @@ def _primary_column(outlines: Path) -> str:
 
 def _layers(table: pd.DataFrame, with_outlines: bool) -> Iterator[Layer]:
     """Yield buildings with outlines, and those without."""
-    places = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
     if not with_outlines:
-        yield Layer(BUILDINGS, table, points(*places))
+        yield Layer(BUILDINGS, table, points(table))
         return
     shapes = shapely.from_wkb(table.pop(_OUTLINE).to_numpy(dtype=object), on_invalid="ignore")
     # Buildings without a polygon are points
     drawn = np.isin(shapely.get_type_id(shapes), (3, 6))
     yield Layer(BUILDINGS, table[drawn], _multiple(shapes[drawn]))
     if not drawn.all():
-        yield Layer(WITHOUT_OUTLINE, table[~drawn], points(*(values[~drawn] for values in places)))
+        yield Layer(WITHOUT_OUTLINE, table[~drawn], points(table[~drawn]))
 
 
 def _multiple(shapes: Shapes) -> Shapes:
@@ -272,9 +271,8 @@ def _other_layers(sources: MapSources, pairs: Path, has_places: bool) -> Iterato
         yield from building_layers(pairs, sources.ranked, sources.outlines)
     if not sources.stations.empty:
         table = sources.stations
-        places = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
         chosen = [name for name in _OF_STATIONS if name in table]
-        yield Layer(STATIONS, table[chosen], points(*places))
+        yield Layer(STATIONS, table[chosen], points(table))
     # Totals are known once all pairs are taken
     totals = sources.totals()
     if totals is not None:
@@ -285,8 +283,7 @@ def _areas(totals: RegionTotals) -> Layer:
     """Return totals as polygons of their cells, or as points amid their pairs."""
     table = totals.table
     if totals.outlines is None:
-        places = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
-        return Layer(AREAS, table, points(*places))
+        return Layer(AREAS, table, points(table))
     # Of one type with those of buildings
     polygons = [shapely.Polygon(corners) for corners in totals.outlines]
     shapes = shapely.multipolygons([[polygon] for polygon in polygons])

@@ -26,12 +26,12 @@ LARGEST, SMALLEST = 2.6, 1.2
 #: visible on buildings of its class.
 EDGE, OPACITY = 0.25, 150
 
-#: Geometry of a layer -> its number in QML, kind of symbol, and class of the symbol's layer.
+#: Geometry of a layer -> its number in QML, kind of symbol, class of the symbol's layer, and its
+#: name in a project.
 _KINDS = {
-    "Point": ("0", "marker", "SimpleMarker"),
-    "LineString": ("1", "line", "SimpleLine"),
-    "Polygon": ("2", "fill", "SimpleFill"),
-    "MultiPolygon": ("2", "fill", "SimpleFill"),
+    "Point": ("0", "marker", "SimpleMarker", "Point"),
+    "LineString": ("1", "line", "SimpleLine", "Line"),
+    **dict.fromkeys(("Polygon", "MultiPolygon"), ("2", "fill", "SimpleFill", "Polygon")),
 }
 
 
@@ -173,7 +173,7 @@ def _add_symbol(
     symbols: ElementTree.Element, name: str, geometry: str, *layers: Mapping[str, str]
 ) -> None:
     """Add a symbol of layers with these options, the lowest first."""
-    _, kind, layer_class = _KINDS[geometry]
+    _, kind, layer_class, _ = _KINDS[geometry]
     symbol = ElementTree.SubElement(
         symbols, "symbol", type=kind, name=name, alpha="1", clip_to_extent="1"
     )
@@ -199,14 +199,6 @@ def column_aliases(columns: Iterable[str], units: Mapping[str, str]) -> dict[str
     units = {name: f" ({unit})" for name, unit in units.items() if unit not in ("", "1")}
     return {name: name.replace("_", " ") + units.get(name, "") for name in columns}
 
-
-#: Geometry of a layer as a project names it.
-_GEOMETRIES = {
-    "Point": "Point",
-    "LineString": "Line",
-    "Polygon": "Polygon",
-    "MultiPolygon": "Polygon",
-}
 
 #: WGS 84 as projects describe it; the authority's name implies longitude and latitude.
 _REFERENCE = {
@@ -324,7 +316,7 @@ def _add_layer(
         tree, "layer-tree-layer", facts | {"checked": "Qt::Checked", "expanded": "1"}
     )
     ElementTree.SubElement(order, "layer", id=identifier)
-    facts = {"type": "vector", "geometry": _GEOMETRIES[layer.geometry]}
+    facts = {"type": "vector", "geometry": _KINDS[layer.geometry][3]}
     element = ElementTree.SubElement(described, "maplayer", facts)
     ElementTree.SubElement(element, "id").text = identifier
     ElementTree.SubElement(element, "datasource").text = source

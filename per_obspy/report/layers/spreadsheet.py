@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,30 +23,15 @@ LONGEST_TEXT = 1000
 _FORMULA = re.compile(FORMULA)
 
 
-class Sheet:
-    """
-    A table with its name and the units of its columns.
+class Sheet(NamedTuple):
+    """A table, of which the first ``ROWS`` rows are written, with the units of its columns."""
 
-    Parameters
-    ----------
-    name : str
-        Of the sheet.
-    table : DataFrame
-        Its first ``ROWS`` rows are written.
-    units : mapping of str to str
-        Column -> unit; others have none.
-    own : collection of str
-        Columns that are computed, besides those of every risk table: their numbers are rounded.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        table: pd.DataFrame,
-        units: Mapping[str, str],
-        own: Collection[str] = (),
-    ) -> None:
-        self.name, self.table, self.units, self.own = name, table.head(ROWS), units, own
+    name: str
+    table: pd.DataFrame
+    #: Columns without a unit have none.
+    units: Mapping[str, str]
+    #: Columns that are computed, besides those of every risk table: their numbers are rounded.
+    own: Collection[str] = ()
 
 
 def write_workbook(sheets: Sequence[Sheet], path: Path) -> None:
@@ -77,7 +62,7 @@ def _add_sheet(book: Any, sheet: Sheet) -> None:
     page.freeze_panes = "C3" if "rank" in names else "B3"
     page.append([_text_cell(page, name, bold=True) for name in names])
     page.append([_text_cell(page, sheet.units.get(name, ""), bold=False) for name in names])
-    plain = rounded_table(sheet.table, sheet.own)
+    plain = rounded_table(sheet.table.head(ROWS), sheet.own)
     for row in plain.itertuples(index=False, name=None):
         page.append([_cell(page, value) for value in row])
 

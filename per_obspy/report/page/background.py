@@ -303,14 +303,8 @@ def _without_edges(lines: Shapes, side: float) -> Shapes:
     ends = along.any(axis=1) | (line[1:] != line[:-1])
     part = np.concatenate([[0], np.cumsum(ends)])
     has_length = np.bincount(part)[part] > 1
-    return _lines_of(corners[has_length], part[has_length])
-
-
-def _lines_of(corners: FloatArray, part: NDArray[np.int64]) -> Shapes:
-    """Return lines from their corners, and the number of the line of each."""
-    import shapely
-
-    return np.asarray(shapely.linestrings(corners, indices=np.unique(part, return_inverse=True)[1]))
+    number = np.unique(part[has_length], return_inverse=True)[1]
+    return np.asarray(shapely.linestrings(corners[has_length], indices=number))
 
 
 def _near(lines: Shapes, box: Box) -> Shapes:
@@ -352,6 +346,5 @@ def _packed(lines: Shapes) -> list[list[int]]:
     steps = np.diff(whole, axis=0, prepend=0)
     steps[is_first] = whole[is_first]
     kept = is_first | steps.any(axis=1)
-    steps, line = steps[kept], line[kept]
-    starts = np.flatnonzero(np.concatenate([[True], line[1:] != line[:-1]]))
-    return [part.ravel().tolist() for part in np.split(steps, starts[1:])]
+    starts = np.flatnonzero(is_first[kept])
+    return [part.ravel().tolist() for part in np.split(steps[kept], starts[1:])]

@@ -36,7 +36,6 @@ from per_obspy.report.statements import (
     sureness,
 )
 from per_obspy.report.style import BUILDING_COLOURS, UNKNOWN_COLOUR, class_colours
-from per_obspy.report.tally import PairTally
 from per_obspy.report.texts import LANGUAGES, fixed_phrases
 from per_obspy.report.words import missing_gap, prevention_kind
 from per_obspy.results.table_files import rounded_table
@@ -111,7 +110,11 @@ def page_content(results: Results) -> tuple[dict[str, Any], list[PackedTable]]:
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
         "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
         **_sentences(results),
-        "states": _states(results.tally, texts),
+        # The likeliest first
+        "states": [
+            {"name": name, "label": texts[f"state_{name}"], "count": results.tally.states[name]}
+            for name in EVERY_STATE
+        ],
         "classes": _classes(results, texts),
         "pair_count": results.tally.pairs,
         **_drawn(results),
@@ -213,14 +216,6 @@ def _buildings(results: Results) -> pd.DataFrame:
         return worst
     sentences = [fixed_phrases(str(text), results.language) for text in worst["prevention"]]
     return worst.assign(prevention=sentences)
-
-
-def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return the states, the likeliest first, with label and number of pairs."""
-    return [
-        {"name": name, "label": texts[f"state_{name}"], "count": tally.states[name]}
-        for name in EVERY_STATE
-    ]
 
 
 def _classes(results: Results, texts: Mapping[str, str]) -> list[dict[str, Any]]:

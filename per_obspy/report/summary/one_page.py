@@ -198,7 +198,10 @@ def _write_pairs(figure: Figure, results: Results, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
     figure.text(LEFT, at, results.texts["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
-    _write_row(figure, _titles(results), at, MOTION_COLOUR)
+    # An ensemble lacks the needed gap
+    hidden = {""} if "demand" in results.listed else {"", "needed"}
+    titles = ["" if key in hidden else results.texts[f"head_{key}"] for key in COLUMNS]
+    _write_row(figure, titles, at, MOTION_COLOUR)
     # One per line
     for position, (_, pair) in enumerate(results.listed.head(LISTED).iterrows(), start=1):
         # As many as the summary lists
@@ -213,12 +216,6 @@ def _write_pairs(figure: Figure, results: Results, at: float) -> None:
         _write_row(figure, cells, at, "black")
     if not results.buildings.empty:
         _write_buildings(figure, results, at - 2.5 * LINE)
-
-
-def _titles(results: Results) -> list[str]:
-    """Return the titles of the columns; an ensemble lacks the needed gap."""
-    hidden = set() if "demand" in results.listed else {"needed"}
-    return [results.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
 
 
 def _number_cells(pair: dict[Hashable, Any], language: str) -> list[str]:
