@@ -216,25 +216,28 @@ class KeptLogs:
 
     The system clears new memory where it is first written, which takes longer than the impacts
     that are written there. Memory is kept for a number of logs (``rows``) and of lines of each
-    (``impacts``); more are new each time.
+    (``impacts``): fewer logs have more lines. More are new each time.
     """
 
     def __init__(self, rows: int, impacts: int) -> None:
         """Begin without memory."""
-        self.impacts = impacts
-        self._rows = rows
+        self._impacts, self._rows = impacts, rows
         self._free: list[FloatArray] = []
+
+    def _lines(self, rows: int) -> int:
+        """Return how many lines each of some logs has at first."""
+        return self._impacts * max(self._rows // rows, 1)
 
     def room(self, rows: int, impacts: int) -> FloatArray:
         """Return logs (n_rows, n_lines, LOG_COLUMNS) of any content."""
-        if rows > self._rows or impacts != self.impacts:
+        if rows > self._rows or impacts != self._lines(rows):
             return np.empty((rows, impacts, LOG_COLUMNS))
         # Threads share the list: another one may take its last
         try:
             whole = self._free.pop()
         except IndexError:
-            whole = np.empty((self._rows, impacts, LOG_COLUMNS))
-        return whole[:rows]
+            whole = np.empty((self._rows * self._impacts, LOG_COLUMNS))
+        return whole[: rows * impacts].reshape(rows, impacts, LOG_COLUMNS)
 
     def keep(self, logs: FloatArray) -> None:
         """Take back logs that are no longer used."""
@@ -243,7 +246,7 @@ class KeptLogs:
 
     def fill(self, rows: int, run: Callable[[FloatArray], int]) -> FloatArray:
         """Return logs that a run has filled; it returns the most impacts that a log has to hold."""
-        room = self.impacts
+        room = self._lines(rows)
         while (impacts := run(logs := self.room(rows, room))) > room:
             self.keep(logs)
             room = impacts

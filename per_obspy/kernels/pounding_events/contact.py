@@ -24,6 +24,7 @@ from per_obspy.kernels.pounding_events.motion import (
     GAP,
     IMPACTS,
     IN_CONTACT,
+    KEPT_LINES,
     LINGERING,
     MASS,
     PARTICIPATION,
@@ -142,9 +143,10 @@ def has_room(row, log):
     lines = _count_lines(row)
     if lines > log.shape[0] or row[0, ALL_IMPACTS] > MOST_IMPACTS:
         return False
-    # half of the log for the next step
-    if 2 * lines > log.shape[0]:
+    # once half of what was left is used: not in every step where most lines count
+    if 2 * lines > log.shape[0] + row[0, KEPT_LINES]:
         drop_uncounted(row, log)
+        row[0, KEPT_LINES] = _count_lines(row)
     return True
 
 

@@ -80,7 +80,9 @@ COUNTED_SPEED = OPENING
 RAMP_RESPONSE = 88
 #: impacts of a row in all its steps so far (first line only; rows in lanes only)
 ALL_IMPACTS = 112
-ROW_COLUMNS = 113
+#: lines that its log had when those that no longer count were last left out (likewise)
+KEPT_LINES = 113
+ROW_COLUMNS = 114
 
 #: Largest angle omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1
 #: + xi)).

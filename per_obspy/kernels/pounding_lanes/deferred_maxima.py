@@ -27,7 +27,6 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     TILE_LOW,
     TILE_RADIUS_SQUARED,
     TILE_RADIUS_SQUARED_BOUND,
-    TILE_STEPS,
     VELOCITY,
     at,
 )
@@ -67,9 +66,9 @@ class Record(NamedTuple):
 
 
 @inlined
-def fill_ground(record, step, ground):
+def fill_ground(record, step, count, ground):
     """
-    Fill the north and east acceleration at a step and the TILE_STEPS steps after it.
+    Fill the north and east acceleration at a step and so many steps after it.
 
     Steps count the parts of all sampling intervals; after the record the ground rests.
     """
@@ -77,7 +76,7 @@ def fill_ground(record, step, ground):
     refinement = record.refinement
     k = step // refinement
     part = step % refinement
-    for column in range(TILE_STEPS + 1):
+    for column in range(count + 1):
         # linear between the samples k and k + 1
         for i in range(2):
             before = components[i, k] if k < components.shape[1] else 0.0
@@ -136,10 +135,11 @@ def may_hold_maximum(deferred, row, i):
 def _search(lanes, place, members, row, i, deferred, record, ground):
     """Search the deferred tile of building i."""
     # ground motion of the tile, then its maxima
-    fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
+    count = int(deferred[i, STEP_COUNT])
+    fill_ground(record, int(deferred[i, FIRST_STEP]), count, ground)
     u = deferred[i, FIRST_DISPLACEMENT]
     z = deferred[i, FIRST_VELOCITY]
-    search_tile(members, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
+    search_tile(members, row, i, u, z, ground, count)
     write_maxima(lanes, place, row, i)
 
 

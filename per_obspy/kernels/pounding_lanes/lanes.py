@@ -27,8 +27,9 @@ from per_obspy.kernels._jit import inlined, lean, vectorised
 
 #: Pairs that are computed side by side.
 PAIR_LANES = 32
-#: Steps of a tile: a multiple of the steps that one loop over the lanes takes.
-TILE_STEPS, UNROLLED_STEPS = 32, 4
+#: Steps of a tile, and of one of rows, of which more buildings are stepped again where one has an
+#: event: multiples of the steps that one loop over the lanes takes.
+TILE_STEPS, ROW_TILE_STEPS, UNROLLED_STEPS = 32, 16, 4
 #: Flags, which add up: building 1 or 2 of a lane may pass a maximum in the tile, an event may
 #: happen.
 PEAK_FLAGS, EVENT_FLAG = (1, 2), 4

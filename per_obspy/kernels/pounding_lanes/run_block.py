@@ -23,6 +23,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     PAIRS,
     PEAK_FLAGS,
     RELATIVE_SO_FAR,
+    ROW_TILE_STEPS,
     ROWS,
     STRUCTURE_ROWS,
     TILE_STEPS,
@@ -147,8 +148,8 @@ def _advance(kind, lanes, flags, memory, firsts, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     while step < last:
         # all lanes side by side through one tile
-        fill_ground(record, step, grounds[0])
-        count = min(TILE_STEPS, last - step)
+        count = min(ROW_TILE_STEPS if kind == ROWS else TILE_STEPS, last - step)
+        fill_ground(record, step, count, grounds[0])
         if sweep_tile(kind, lanes, flags, grounds[0], count):
             # flagged rows one by one
             for number in range(firsts.size - 1):

@@ -28,6 +28,8 @@ from per_obspy.kernels.pounding_events.motion import (
 from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.impact_steps import run_free_impacts, set_states, stays_open
 from per_obspy.kernels.pounding_lanes.lanes import (
+    CLUSTER_FIRST,
+    CLUSTER_LAST,
     CONTACT_FUNCTION,
     CONTACT_ROUNDING,
     DISPLACEMENT,
@@ -52,16 +54,22 @@ from per_obspy.kernels.pounding_lanes.relative_in_step import (
     raise_relative,
     raise_relative_to,
 )
-from per_obspy.kernels.pounding_lanes.stiffness_changes import run_stiffness_changes
+from per_obspy.kernels.pounding_lanes.stiffness_changes import (
+    branch_and_maxima,
+    restore,
+    run_changes,
+    run_stiffness_changes,
+)
 from per_obspy.kernels.pounding_rows.row_impacts import run_row_impacts
 
 #: Events of one step above which a history is given up: so many, and so many per bounce allowed.
 MOST_EVENTS, EVENTS_PER_BOUNCE = 1000, 100
 
 # columns of the states of a row in a step: displacement, velocity over omega and acceleration over
-# omega² (m), at its start and at its end
-START, END = 0, 3
-STATE_COLUMNS = 6
+# omega² (m), at its start and at its end; then what a step that is run again may change: branch and
+# maxima, and the range of the displacement in it (m)
+START, END, BEFORE, LOW, HIGH = 0, 3, 6, 11, 12
+STATE_COLUMNS = 13
 
 
 @inlined
@@ -173,6 +181,47 @@ def _may_yield_in_step(members, row, states):
         ):
             return True
     return False
+
+
+@inlined
+def _may_join_yielding(members, row, states):
+    """Return whether a building that may yield or unload in a step is in contact with another."""
+    for i in range(row.shape[0]):
+        own = i * STRUCTURE_ROWS
+        is_joined = members[own + CLUSTER_FIRST] != members[own + CLUSTER_LAST]
+        if is_joined and may_yield(members, own, _state(states, i, START), _state(states, i, END)):
+            return True
+    return False
+
+
+@lean
+def _change_stiffnesses(members, row, states, segment):
+    """
+    Carry a row through a step in which buildings yield or unload, each on its own.
+
+    Return whether none of them certainly meets another; else the row is as before.
+    """
+    if _may_join_yielding(members, row, states):
+        return False
+    # one building after the other, and the interface before it
+    for i in range(row.shape[0]):
+        before = branch_and_maxima(row, i)
+        for k in range(len(before)):
+            states[i, BEFORE + k] = before[k]
+        start, end = _state(states, i, START), _state(states, i, END)
+        is_certain, end, low, high = run_changes(members, row, i, start, end, segment)
+        if i > 0 and not row[i - 1, IN_CONTACT]:
+            is_certain &= low - states[i - 1, HIGH] > -row[i - 1, GAP]
+        if not is_certain:
+            # all of them back
+            for k in range(i + 1):
+                branch = states[k, BEFORE], states[k, BEFORE + 1], states[k, BEFORE + 2]
+                maxima = states[k, BEFORE + 3], states[k, BEFORE + 4]
+                restore(members, row, k, branch + maxima, segment.duration)
+            return False
+        states[i, LOW], states[i, HIGH] = low, high
+        _set_state(states, i, END, end)
+    return True
 
 
 @lean
@@ -332,14 +381,19 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
             own = i * STRUCTURE_ROWS
             start = _state(states, i, START)
             _set_state(states, i, END, state_after_step(members, own, start, before, after))
-        if _may_touch_in_step(members, row, states, before, after, duration) or _may_yield_in_step(
-            members, row, states
-        ):
+        touches = _may_touch_in_step(members, row, states, before, after, duration)
+        yields = _may_yield_in_step(members, row, states)
+        segment = segment_of_step(row, before, after, duration)
+        if yields and not touches and _change_stiffnesses(members, row, states, segment):
+            # each building on its own, to the end of the step
+            for i in range(row.shape[0]):
+                own, end = i * STRUCTURE_ROWS, _state(states, i, END)
+                _set_state(states, i, END, complete_state(members, own, end[0], end[1], after))
+        elif touches or yields:
             # the step again with its events
             _write_members(members, row, states)
             load_row(members, row)
             row[0, BOUNCES] = 0.0
-            segment = segment_of_step(row, before, after, duration)
             is_through = run_row_impacts(members, row, log, window, segment)
             if not is_through or not has_room(row, log):
                 return False

@@ -308,7 +308,7 @@ def run_changes(pair, row, i, start, end, segment):
 
 
 @inlined
-def _branch_and_maxima(row, i):
+def branch_and_maxima(row, i):
     """Return what ``run_changes`` may change of structure i: its branch and its maxima."""
     return (
         row[i, PHASE],
@@ -320,7 +320,7 @@ def _branch_and_maxima(row, i):
 
 
 @lean
-def _restore(pair, row, i, before, duration):
+def restore(pair, row, i, before, duration):
     """Return structure i to the branch and the maxima that it had before."""
     is_other = (row[i, PHASE] != before[0]) | (row[i, PLASTIC] != before[1])
     row[i, PHASE] = before[0]
@@ -355,8 +355,8 @@ def run_stiffness_changes(pair, row, left, right, next_left, next_right, segment
         Whether the relative displacement is certain to stay in this range; else pair and row are
         as before, and the step is left to the event code.
     """
-    before = _branch_and_maxima(row, 0)
-    other_before = _branch_and_maxima(row, 1)
+    before = branch_and_maxima(row, 0)
+    other_before = branch_and_maxima(row, 1)
     # one structure after the other
     is_certain, next_left, low, high = run_changes(pair, row, 0, left, next_left, segment)
     if is_certain:
@@ -366,6 +366,6 @@ def run_stiffness_changes(pair, row, left, right, next_left, next_right, segment
         if is_certain & (other_low - high > least) & (other_high - low < largest):
             set_states(pair, next_left, next_right)
             return True
-    _restore(pair, row, 0, before, segment.duration)
-    _restore(pair, row, 1, other_before, segment.duration)
+    restore(pair, row, 0, before, segment.duration)
+    restore(pair, row, 1, other_before, segment.duration)
     return False
