@@ -141,9 +141,17 @@ def write_ordered(table: pa.Table, number: int, path: Path) -> None:
         pq.write_table(table, part, row_group_size=TOGETHER, use_dictionary=dictionaries)
 
 
+#: Columns of texts that hardly repeat within a group.
+_NAMES = {
+    "pair_id", "row_id", "rows", "worst_pair", "worst_neighbour", "prevention", "building_id",
+    *(f"building_id_{end}" for end in ("1", "2", "left", "right")),
+}  # fmt: skip
+
+
 def text_columns(schema: pa.Schema) -> list[str]:
-    """Return the columns of text, which a dictionary makes smaller."""
-    return [field.name for field in schema if pa.types.is_string(field.type)]
+    """Return the columns of text that a dictionary makes smaller."""
+    texts = (field.name for field in schema if pa.types.is_string(field.type))
+    return [name for name in texts if name not in _NAMES]
 
 
 def joined_schema(parts: Sequence[Path]) -> pa.Schema:
