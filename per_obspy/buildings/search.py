@@ -39,7 +39,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config.pairs import Rows
 from per_obspy.errors import Rejection
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.results.parts import batches, bounded_database
+from per_obspy.results.parts import Order, batches, bounded_database
 from per_obspy.results.ranked_table import RankedTable
 from per_obspy.results.table_files import regrouped
 
@@ -90,10 +90,14 @@ GROUP = 10_000
 THREADS = 1
 
 
+#: Numbers from here on are those of buildings that belong to one pair only, until all are found.
+OWN = 1 << 62
+
 #: Numbers of the buildings of a pair, and of its piece.
 NUMBERS = [(name, pa.int32()) for name in ("code_1", "code_2", "piece")]
 
-_ORDERED = "SELECT * FROM contacts ORDER BY station, row_id, interface"
+#: Order of computation.
+BY_STATION = Order("station, row_id, interface", ("station", "row_id", "interface"))
 
 #: Identifier of one building of a pair, and its end: 2 · pair, + 1 at building 2.
 _ENDS = pa.schema([("end", pa.int64()), ("name", pa.string())])
@@ -114,31 +118,44 @@ class AllRows(NamedTuple):
     served: Mapping[str, int]
 
 
-def find_rows(
-    pairs: RankedTable, rows: Rows, area: str | None, room: Path, histories: bool
-) -> AllRows:
+def find_rows(pairs: RankedTable, rows: Rows, area: str | None, room: Path) -> AllRows:
     """
     Find the rows of all pairs of a risk table, and write their contacts into a file in a folder.
 
     They are in their order of computation. ``area`` is the column of the area of each pair, if
-    areas have names; contacts have the columns that histories need if these are wanted.
+    areas have names.
     """
-    carried = CARRIED if histories else WITHOUT_HISTORIES
-    columns = {name: name for name in (*FINDING, *carried)} | ({AREA: area} if area else {})
     found = list[PieceRows]()
     ordered = room / "contacts.parquet"
     with one_thread_database(room) as database, database.cursor() as inner:
-        # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
-        codes = number_buildings(pairs, inner)
-        inner.register("pairs", _numbered(pairs, columns, codes))
-        register_tables(database, "contacts", _contacts(_pieces(inner), rows, carried, found))
-        tables = tables_of(database, _ORDERED, PIECE)
+        named, pieces = connected_pieces(pairs, CARRIED, area, inner)
+        register_tables(database, "contacts", _contacts(pieces, rows, found))
+        query = f"SELECT * FROM contacts ORDER BY {BY_STATION.by}"
+        tables = tables_of(database, query, PIECE)
         # Once the first contacts are ordered, all are found
-        count = _write(_number(tables, int(codes.max()) + 1, found), ordered)
-    return AllRows(ordered, count, *_totals(found))
+        count = _write(numbered_contacts(tables, named, found), ordered)
+    return AllRows(ordered, count, *totals_of(found))
 
 
-def _totals(found: list["PieceRows"]) -> tuple[int, tuple[Rejection, ...], Counter[str]]:
+def connected_pieces(
+    pairs: RankedTable,
+    carried: Sequence[str],
+    area: str | None,
+    database: duckdb.DuckDBPyConnection,
+) -> tuple[int, Iterator[pa.Table]]:
+    """
+    Return the number of buildings with an identifier, and the pairs of each piece by their ranks.
+
+    Pieces, made as they are asked for, have the columns that :func:`find_in_piece` needs.
+    """
+    columns = {name: name for name in (*FINDING, *carried)} | ({AREA: area} if area else {})
+    # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
+    codes = number_buildings(pairs, database)
+    database.register("pairs", _numbered(pairs, columns, codes))
+    return int(codes.max()) + 1, _pieces(database)
+
+
+def totals_of(found: Sequence["PieceRows"]) -> tuple[int, tuple[Rejection, ...], Counter[str]]:
     """Return the number of rows, rejections and buildings by station of all pieces."""
     served = sum((piece.served for piece in found), Counter[str]())
     # Rejections as if there was one piece
@@ -148,11 +165,11 @@ def _totals(found: list["PieceRows"]) -> tuple[int, tuple[Rejection, ...], Count
 
 
 def _contacts(
-    pieces: Iterable[pa.Table], rows: Rows, carried: Sequence[str], found: list["PieceRows"]
+    pieces: Iterable[pa.Table], rows: Rows, found: list["PieceRows"]
 ) -> Iterator[pa.Table]:
     """Yield the contacts of each piece, and keep what else is found in it."""
     for pairs in pieces:
-        contacts, piece = find_in_piece(pairs, rows, carried)
+        contacts, piece = find_in_piece(pairs, rows, CARRIED)
         found.append(piece)
         yield contacts
 
@@ -263,8 +280,7 @@ class PieceRows(NamedTuple):
 
     #: Number of rows.
     rows: int
-    #: Ends of pairs (2 · (rank - 1), + 1 at building 2) whose building belongs to the pair only.
-    #: Shape (n,).
+    #: Numbers of the buildings that belong to one pair only. Shape (n,).
     own: IntArray
     #: Number of buildings in whose pairs the record of each station is used.
     served: Counter[str]
@@ -280,7 +296,8 @@ def find_in_piece(
 
     Pairs have the columns ``FINDING`` and those that are carried, as far as they are known,
     ``code_1`` and ``code_2``; contacts, along each row, have the carried ones and the columns of
-    the row. The number of a building of one pair only is -1 - its end.
+    the row. The number of a building of one pair only is ``OWN`` + its end: 2 · (rank - 1), + 1 at
+    building 2.
     """
     contacts = contacts_of(pairs, rows.angle)
     joints = joints_of(contacts, pairs, rows.angle)
@@ -295,7 +312,7 @@ def find_in_piece(
     # And what is found besides
     served = served_buildings(pairs["station"].to_pandas(), contacts.buildings)
     rejected = [*contacts.rejected, *joints.rejected]
-    return table, PieceRows(chains.azimuth.size, ends[contacts.codes < 0], served, rejected)
+    return table, PieceRows(chains.azimuth.size, OWN + ends[contacts.codes < 0], served, rejected)
 
 
 def served_buildings(station: pd.Series, buildings: IntArray) -> Counter[str]:
@@ -319,7 +336,7 @@ def _sides(
     """Return whether contacts are turned, and number and name of the buildings beside them."""
     pair = chains.pair
     columns: dict[str, pa.Array | pa.ChunkedArray] = {"turned": pa.array(chains.turned)}
-    numbers = np.where(contacts.codes < 0, -1 - ends, contacts.codes)
+    numbers = np.where(contacts.codes < 0, OWN + ends, contacts.codes)
     # The left building of a turned pair is its building 2
     for side, second in (("left", chains.turned), ("right", ~chains.turned)):
         names = [name.take(pa.array(pair)) for name in contacts.names]
@@ -400,8 +417,10 @@ def _write(tables: Iterator[pa.Table], path: Path) -> int:
     return count
 
 
-def _number(tables: Iterable[pa.Table], named: int, found: list[PieceRows]) -> Iterator[pa.Table]:
-    """Yield contacts with numbers of the buildings that belong to one pair only."""
+def numbered_contacts(
+    tables: Iterable[pa.Table], named: int, found: Sequence[PieceRows]
+) -> Iterator[pa.Table]:
+    """Yield contacts whose buildings that belong to one pair only follow the named ones."""
     own: IntArray | None = None
     for table in tables:
         # After those with an identifier, in the order of the pairs
@@ -410,7 +429,7 @@ def _number(tables: Iterable[pa.Table], named: int, found: list[PieceRows]) -> I
         columns = dict(zip(table.column_names, table.columns, strict=True))
         for name in ("building_number_left", "building_number_right"):
             number = table[name].to_numpy()
-            number = np.where(number < 0, named + np.searchsorted(own, -1 - number), number)
+            number = np.where(number < OWN, number, named + np.searchsorted(own, number))
             columns[name] = pa.array(number)
         yield pa.table(columns)
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from typing import NamedTuple
 
 import duckdb
 import numpy as np
@@ -42,7 +43,20 @@ _ENDS = (duckdb.Error, pa.ArrowException, PerError, OSError, RuntimeError, Value
 #: Column with the number of the part to which a row belongs.
 _PART = "order_part"
 
-_ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
+
+class Order(NamedTuple):
+    """Order of rows."""
+
+    #: As a database takes it.
+    by: str
+    #: Columns on which it depends.
+    columns: tuple[str, ...]
+    #: Those of them that only parts have.
+    of_parts: tuple[str, ...] = ()
+
+
+#: Pairs, the worst first.
+WORST_FIRST = Order(", ".join((*KEYS, "pair_id")), (*KEYS, "pair_id"), KEYS)
 
 
 @contextmanager
@@ -116,15 +130,28 @@ def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
     path : Path
         The file.
     """
-    table = as_arrow(rows.assign(**{_PART: number}))
+    write_ordered(as_arrow(rows), number, path)
+
+
+def write_ordered(table: pa.Table, number: int, path: Path) -> None:
+    """Write a part of a table that is in some order, with its number."""
     dictionaries = text_columns(table.schema)
+    table = table.append_column(_PART, pa.array(np.full(table.num_rows, number)))
     with written_whole(path) as part:
         pq.write_table(table, part, row_group_size=TOGETHER, use_dictionary=dictionaries)
 
 
+#: Columns of texts that hardly repeat within a group.
+_NAMES = {
+    "pair_id", "row_id", "rows", "worst_pair", "worst_neighbour", "prevention", "building_id",
+    *(f"building_id_{end}" for end in ("1", "2", "left", "right")),
+}  # fmt: skip
+
+
 def text_columns(schema: pa.Schema) -> list[str]:
-    """Return the columns of text, which a dictionary makes smaller."""
-    return [field.name for field in schema if pa.types.is_string(field.type)]
+    """Return the columns of text that a dictionary makes smaller."""
+    texts = (field.name for field in schema if pa.types.is_string(field.type))
+    return [name for name in texts if name not in _NAMES]
 
 
 def joined_schema(parts: Sequence[Path]) -> pa.Schema:
@@ -137,51 +164,59 @@ def joined_schema(parts: Sequence[Path]) -> pa.Schema:
     return pa.schema([(name, _common(kinds)) for name, kinds in types.items() if name not in order])
 
 
-def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
+def joined_rows(
+    parts: Sequence[Path], schema: pa.Schema, size: int, order: Order = WORST_FIRST
+) -> Iterator[pa.Table]:
     """
     Yield the rows of all parts in their order, so many at a time.
 
     Parameters
     ----------
     parts : sequence of Path
-        From :func:`write_part`.
+        From :func:`write_part`, or :func:`write_ordered` in another order.
     schema : Schema
         From :func:`joined_schema`; columns that a part lacks are empty.
     size : int
         Number of rows.
+    order : Order
+        Of all parts and of the whole.
     """
     with temporary_folder(parts[0].parent) as room:
         for level in count():
             if len(parts) <= MOST_PARTS:
                 break
-            parts = _merged_groups(parts, schema, room / str(level))
-        yield from _merged(parts, schema, size)
+            parts = _merged_groups(parts, schema, room / str(level), order)
+        yield from _merged(parts, schema, size, order)
 
 
-def _merged_groups(parts: Sequence[Path], schema: pa.Schema, room: Path) -> list[Path]:
+def _merged_groups(
+    parts: Sequence[Path], schema: pa.Schema, room: Path, order: Order
+) -> list[Path]:
     """Merge many parts to fewer and longer ones in a folder of their own."""
     room.mkdir()
     # Columns of the order are needed once more, with the number of the longer part
-    keys = [pq.read_schema(parts[0].absolute()).field(name) for name in KEYS]
+    keys = [pq.read_schema(parts[0].absolute()).field(name) for name in order.of_parts]
     kept, merged = pa.schema([*schema, *keys]), []
     whole = kept.append(pa.field(_PART, pa.int64()))
     for number, first in enumerate(range(0, len(parts), MOST_PARTS)):
         merged.append(room / f"{number:06}.parquet")
         with pq.ParquetWriter(merged[-1], whole, use_dictionary=text_columns(whole)) as writer:
             # As a part of a chunk: in its order, a few thousand rows per group
-            for rows in _merged(parts[first : first + MOST_PARTS], kept, TOGETHER):
+            for rows in _merged(parts[first : first + MOST_PARTS], kept, TOGETHER, order):
                 numbers = pa.array(np.full(rows.num_rows, number))
                 writer.write_table(rows.append_column(whole.field(_PART), numbers))
     return merged
 
 
-def _merged(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
+def _merged(
+    parts: Sequence[Path], schema: pa.Schema, size: int, order: Order
+) -> Iterator[pa.Table]:
     """Yield the rows of few parts in their order, so many at a time."""
     rows = {part_number(part): WaitingRows(part_rows(part, schema), schema) for part in parts}
     # For each row of the whole the part in which it is the next one
     left = np.empty(0, np.int64)
-    for order in parts_in_order(parts, size):
-        left = np.concatenate([left, order])
+    for numbers in parts_in_order(parts, size, order):
+        left = np.concatenate([left, numbers])
         # The database gives batches of fewer rows than are asked for
         while left.size >= size:
             yield next_rows(rows, left[:size])
@@ -190,11 +225,14 @@ def _merged(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.
         yield next_rows(rows, left)
 
 
-def parts_in_order(parts: Sequence[Path], size: int) -> Iterator[NDArray[np.int64]]:
+def parts_in_order(
+    parts: Sequence[Path], size: int, order: Order = WORST_FIRST
+) -> Iterator[NDArray[np.int64]]:
     """Yield the number of the part of each row in the order of the whole, at most so many."""
     with bounded_database(parts[0].parent) as database:
-        database.register("parts", _one_after_another(parts, [_PART, *KEYS, "pair_id"]))
-        for batch in batches(database, _ORDER, size):
+        database.register("parts", _one_after_another(parts, [_PART, *order.columns]))
+        query = f"SELECT {_PART} FROM parts ORDER BY {order.by}"
+        for batch in batches(database, query, size):
             yield np.asarray(batch[_PART], dtype=np.int64)
 
 

@@ -120,7 +120,7 @@ class RankedTable:
         columns = None if self._columns is None else list(self._columns)
         for path in self._files:
             with self._opened(path) as file:
-                for batch in file.iter_batches(ROWS, columns=columns):
+                for batch in file.iter_batches(ROWS, columns=columns, use_threads=False):
                     yield batch.to_pandas()
 
     def batches(self, size: int, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:

@@ -5,25 +5,40 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-import pyarrow as pa
 import pyarrow.parquet as pq
 
-from per_obspy.buildings.search import IDENTIFIERS, AllRows, chunks_of, find_rows
+from per_obspy.buildings.search import (
+    BY_STATION,
+    GROUP,
+    IDENTIFIERS,
+    WITHOUT_HISTORIES,
+    AllRows,
+    chunks_of,
+    connected_pieces,
+    find_rows,
+    numbered_contacts,
+    one_thread_database,
+    totals_of,
+)
 from per_obspy.buildings.tables import (
+    BY_SEVERITY,
+    RANKED,
+    buildings_of,
     rows_of_parts,
-    rows_without_histories,
     write_buildings,
     write_rows,
 )
 from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
-from per_obspy.results.ranked_table import ranked_table, table_files
+from per_obspy.results.parts import joined_rows, joined_schema
+from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
 from per_obspy.results.totals import PLACE
 from per_obspy.runs.provenance import RunContext
+from per_obspy.runs.tasks.building_piece import PIECES, piece_task
 from per_obspy.runs.tasks.building_rows import RowsTask
 from per_obspy.runs.tasks.ground_files import GroundFiles
-from per_obspy.runs.tasks.parallel import Workers, finish
+from per_obspy.runs.tasks.parallel import Workers, finish, results
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 
 
@@ -67,31 +82,49 @@ def building_rows(
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
-        histories = _has_histories(settings)
-        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room, histories)
-        # Without histories nothing is left to do
-        tasks = _tasks(folder, ground, found) if histories else iter(())
-        parts = _parts(tasks, context.workers, found.contacts)
+        if not _has_histories(settings):
+            return _without_histories(context, pairs, room, facts)
+        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
+        parts = _parts(_tasks(folder, ground, found), context.workers, found.contacts)
         # Parts of an earlier table would be taken for parts of this one
         remove_other_parts(folder / "rows", parts)
-        outputs = write_rows(_interfaces(found, parts), folder, facts)
-        outputs += write_buildings(folder, found.file, settings, facts)
+        files = [part.path for part in parts if part.path]
+        outputs = write_rows(rows_of_parts(files), folder, facts)
+        buildings = buildings_of(folder, found.file, settings)
+        outputs += write_buildings(buildings, folder, settings, facts)
     rejected = (*found.rejected, *rejections(parts))
     failed = any(part.failed for part in parts)
-    return BuildingRowsDone(outputs, _counts(found, folder, parts), rejected, failed, found.served)
+    counts = _counts(found.rows, folder, parts)
+    return BuildingRowsDone(outputs, counts, rejected, failed, found.served)
 
 
-def _interfaces(found: AllRows, parts: Sequence[Part]) -> Iterator[pa.Table]:
-    """Return the interfaces of all parts; of all contacts where no part had to be made."""
-    files = [part.path for part in parts if part.path]
-    return rows_of_parts(files) if files else rows_without_histories(found.file)
+def _without_histories(
+    context: RunContext, pairs: RankedTable, room: Path, facts: Mapping[str, str]
+) -> BuildingRowsDone:
+    """Write both tables from parts of pieces of connected pairs, each in its order."""
+    settings, folder, workers = context.settings, context.folder, context.workers
+    with one_thread_database(room) as database:
+        area = settings.totals.area or PLACE
+        named, pieces = connected_pieces(pairs, WITHOUT_HISTORIES, area, database)
+        tasks = (piece_task(number, piece, settings, room) for number, piece in enumerate(pieces))
+        done = sorted(results(tasks, PIECES, workers), key=lambda one: one[0].number)
+    remove_other_parts(folder / "rows", ())
+    rows, buildings = zip(*(task.files for task, _ in done), strict=True)
+    found = [piece for _, piece in done]
+    # The next row of the whole is the next one of a part
+    interfaces = joined_rows(rows, joined_schema(rows), GROUP, BY_STATION)
+    outputs = write_rows(numbered_contacts(interfaces, named, found), folder, facts)
+    ranked = joined_rows(buildings, joined_schema(buildings), RANKED, BY_SEVERITY)
+    outputs += write_buildings(ranked, folder, settings, facts)
+    count, rejected, served = totals_of(found)
+    return BuildingRowsDone(outputs, _counts(count, folder, ()), rejected, served=served)
 
 
-def _counts(found: AllRows, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
+def _counts(rows: int, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
     """Return the numbers of rows, buildings and chunks."""
     buildings = pq.read_metadata((folder / "buildings.parquet").absolute())
     return {
-        "rows": found.rows,
+        "rows": rows,
         "buildings": int(buildings.num_rows),
         "row_chunks": len(parts),
         "row_chunks_resumed": sum(part.resumed for part in parts),

@@ -42,6 +42,7 @@ from scipy.special import ndtr, ndtri
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
 from per_obspy.kernels.pairs.node_outcomes import (
+    DEMAND_STD,
     OUTCOME_ROWS,
     QUANTILE,
     fill_chances,
@@ -63,7 +64,6 @@ from per_obspy.screening.values import (
     IndexArray,
     Table,
     both,
-    chosen,
     values,
 )
 
@@ -299,27 +299,49 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
     Probabilities from 0 to 1, velocities in m/s, amplifications of at least 1. ``nodes`` are those
     of the motion, (n_nodes, 6), as ``NODES``.
     """
-    shape = uncertain.log_std.size, len(nodes)
-    facts = np.stack(
-        [
-            *(median_gap(pairs), gap_dispersion(pairs)),
-            *(uncertain.log_std, uncertain.velocity_factor),
-            *_received(pairs),
-            values(pairs, "contact_log_std"),
-        ]
-    )
+    facts = _facts(pairs, uncertain.log_std, uncertain.velocity_factor)
+    return _columns(_of_nodes(uncertain.motion.rows(), facts, nodes), pairs)
+
+
+def _facts(pairs: Table, log_std: FloatArray, velocity_factor: FloatArray) -> FloatArray:
+    """Return what is known of pairs besides their motion, in the rows of the kernel."""
+    contact = values(pairs, "contact_log_std")
+    return np.stack([*_lognormal_gap(pairs), log_std, velocity_factor, *_received(pairs), contact])
+
+
+class _OfNodes(NamedTuple):
+    """What the nodes show of pairs, with pairs on the last axis."""
+
+    #: In the rows of the kernel, (OUTCOME_ROWS, n_pairs).
+    outcome: FloatArray
+    #: Share of the nodes that move, (1, n_pairs).
+    moving: FloatArray
+    #: Quantiles of the demands at the nodes, m, and the chances that a demand exceeds them,
+    #: (n_shares, n_pairs).
+    gaps: FloatArray
+    chances: FloatArray
+
+
+def _of_nodes(motion: FloatArray, facts: FloatArray, nodes: FloatArray) -> _OfNodes:
+    """Compute what the nodes show of a motion (5, n_pairs, n_nodes), in the rows of kernels."""
+    demand, log_std = motion[0], facts[DEMAND_STD]
     deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP, CONTACT]].T)
     # one node of certain buildings is all nodes
-    every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
+    every = np.broadcast_to(motion, (*motion.shape[:2], len(nodes)))
     # always writable: a read-only array would compile the kernel a second time
     every = np.require(every, requirements=["C", "W"])
-    outcome = np.empty((OUTCOME_ROWS, len(facts[0])))
+    outcome = np.empty((OUTCOME_ROWS, log_std.size))
     fill_outcomes(every, facts, deviates, outcome)
+    moving = (demand > 0.0).mean(axis=1)[None]
+    return _OfNodes(outcome, moving, *_gaps_and_chances(demand, log_std, nodes))
+
+
+def _columns(found: _OfNodes, pairs: Table) -> Columns:
+    """Return ``COLUMNS``."""
     # the lognormal gap has no share of exactly 0, at which any motion is contact
-    moving = (uncertain.motion.demand > 0.0).mean(axis=1)
-    outcome[0] = np.maximum(outcome[0], one_wall_chance(pairs) * moving)
-    quantiles = demand_quantiles(uncertain.motion.demand, uncertain.log_std, nodes)
-    return dict(zip(COLUMNS, [*outcome, *quantiles], strict=True))
+    chance = np.maximum(found.outcome[0], one_wall_chance(pairs) * found.moving[0])
+    quantiles = _moved_to_shares(found.gaps, found.chances)
+    return dict(zip(COLUMNS, [chance, *found.outcome[1:], *quantiles], strict=True))
 
 
 def demand_quantiles(demands: FloatArray, log_std: FloatArray, nodes: FloatArray) -> FloatArray:
@@ -329,14 +351,26 @@ def demand_quantiles(demands: FloatArray, log_std: FloatArray, nodes: FloatArray
     Arguments are those of :func:`chance_of_contact`, and the nodes of the demands; the result is
     (n_shares, n_pairs).
     """
-    shares = np.array([*DEMAND_SHARES.values()])
+    return _moved_to_shares(*_gaps_and_chances(demands, log_std, nodes))
+
+
+#: Shares of the quantiles of a demand.
+_SHARES = np.array([*DEMAND_SHARES.values()])
+
+
+def _gaps_and_chances(demands: FloatArray, log_std: FloatArray, nodes: FloatArray) -> Both:
+    """Return quantiles of the demands at nodes, m, and the chances that a demand exceeds them."""
     outcomes = demands * np.exp(np.outer(log_std, nodes[:, DEMAND]))
-    gaps = np.maximum(_sorted_quantiles(outcomes, shares), SMALLEST_QUANTILE)
-    # The outcomes of nodes are few: the gaps move to where the chance of contact is the wanted one
-    chance = np.empty(gaps.shape)
-    fill_chances(np.ascontiguousarray(demands), gaps, log_std, chance)
-    score = -ndtri(np.clip(chance, 1e-9, 1.0 - 1e-9))
-    wanted = np.broadcast_to(ndtri(shares)[:, None], gaps.shape)
+    gaps = np.maximum(_sorted_quantiles(outcomes, _SHARES), SMALLEST_QUANTILE)
+    chances = np.empty(gaps.shape)
+    fill_chances(np.ascontiguousarray(demands), gaps, log_std, chances)
+    return gaps, chances
+
+
+def _moved_to_shares(gaps: FloatArray, chances: FloatArray) -> FloatArray:
+    """Return gaps, moved to where the chance of contact is the wanted one: nodes are few."""
+    score = -ndtri(np.clip(chances, 1e-9, 1.0 - 1e-9))
+    wanted = np.broadcast_to(ndtri(_SHARES)[:, None], gaps.shape)
     moved = np.array([at_rows(score, np.log(gaps), one) for one in wanted])
     return np.maximum(np.exp(np.maximum.accumulate(moved)), SMALLEST_QUANTILE)
 
@@ -451,17 +485,25 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
     ``spectra`` are those by which the radii of resampled oscillators change; at the edge beyond the
     grid.
     """
-    count = motion.row.size
-    result = empty_population(count)
+    result = empty_population(motion.row.size)
+    if not motion.row.size:
+        return result
+    facts = _facts(pairs, motion.log_std, np.ones(motion.row.size))
+    buildings, correlations = _estimates(motion, spectra, pairs)
     size = SAMPLES // len(NODES)
     # blocks bound the memory; a pair does not depend on its block
-    for first in range(0, count, size):
-        rows = np.arange(first, min(first + size, count))
-        block, table = motion.rows(rows), chosen(pairs, rows)
-        relative = estimated_motion(block, spectra, table, NODES)
-        uncertain = Uncertain(relative, block.log_std, np.ones(rows.size))
-        for name, column in population(uncertain, table, NODES).items():
-            result[name][rows] = column
+    blocks = list[_OfNodes]()
+    for first in range(0, motion.row.size, size):
+        columns = (buildings, correlations, facts)
+        of_buildings, alike, known = (
+            np.ascontiguousarray(rows[:, first : first + size]) for rows in columns
+        )
+        row = motion.row[first : first + size]
+        moved = _at_nodes(spectra, row, of_buildings, alike, NODES)
+        blocks.append(_of_nodes(moved, known, NODES))
+    found = _OfNodes(*(np.concatenate(rows, axis=1) for rows in zip(*blocks, strict=True)))
+    for name, column in _columns(found, pairs).items():
+        result[name][:] = column
     return result
 
 
@@ -469,6 +511,12 @@ def estimated_motion(
     motion: UncertainMotion, spectra: LogSpectra, pairs: Table, nodes: FloatArray
 ) -> RelativeMotion:
     """Estimate the motion of pairs without contact at nodes (n_nodes, 6) of their buildings."""
+    moved = _at_nodes(spectra, motion.row, *_estimates(motion, spectra, pairs), nodes)
+    return RelativeMotion(*moved)
+
+
+def _estimates(motion: UncertainMotion, spectra: LogSpectra, pairs: Table) -> Both:
+    """Return both buildings and the correlations of pairs in the rows of the kernel."""
     first = _oscillators(motion.first, motion.row, spectra, pairs, 1)
     second = _oscillators(motion.second, motion.row, spectra, pairs, 2)
     # eq. (16), shifted as that which governs at the medians
@@ -476,12 +524,22 @@ def estimated_motion(
         *(motion.first.period, motion.first.damping),
         *(motion.second.period, motion.second.damping),
     )
-    relative = np.empty((MOTION_ROWS, motion.row.size, len(nodes)))
-    deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
-    both_buildings = np.stack([*first, *second])
     correlations = np.stack([np.atleast_1d(shift), values(pairs, "period_correlation")])
-    estimate_motion(*spectra, motion.row, both_buildings, correlations, deviates, relative)
-    return RelativeMotion(*relative)
+    return np.stack([*first, *second]), correlations
+
+
+def _at_nodes(
+    spectra: LogSpectra,
+    row: IndexArray,
+    buildings: FloatArray,
+    correlations: FloatArray,
+    nodes: FloatArray,
+) -> FloatArray:
+    """Return the motion of pairs at nodes, (MOTION_ROWS, n_pairs, n_nodes)."""
+    relative = np.empty((MOTION_ROWS, row.size, len(nodes)))
+    deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
+    estimate_motion(*spectra, row, buildings, correlations, deviates, relative)
+    return relative
 
 
 def _oscillators(

@@ -74,13 +74,14 @@ def stored_log(
     # cell of the grid and position in it, along either axis
     column, period_share = _lower_neighbour(periods, log_period)
     plane, damping_share = _lower_neighbour(dampings, log_damping)
-    next_plane = np.minimum(plane + 1, dampings.size - 1)
-    next_column = np.minimum(column + 1, periods.size - 1)
+    # places of its corners in the stored row after row; a grid of one has one
+    corner = (row * dampings.size + plane) * periods.size + column
+    right, above = min(periods.size - 1, 1), min(dampings.size - 1, 1) * periods.size
     # along the period at the damping below and at that above, then from one to the other
-    left, right = radii[row, plane, column], radii[row, plane, next_column]
-    lower = (1 - period_share) * left + period_share * right
-    left, right = radii[row, next_plane, column], radii[row, next_plane, next_column]
-    upper = (1 - period_share) * left + period_share * right
+    flat, rest = radii.ravel(), 1 - period_share
+    lower = rest * flat.take(corner) + period_share * flat.take(corner + right)
+    corner += above
+    upper = rest * flat.take(corner) + period_share * flat.take(corner + right)
     stored: FloatArray = (1 - damping_share) * lower + damping_share * upper
     return stored
 

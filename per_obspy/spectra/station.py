@@ -352,8 +352,10 @@ def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float
 
 def lacks_azimuths(station: xr.Dataset) -> bool:
     """Return whether a station has two horizontals whose azimuths are not both known."""
-    azimuths = station.get("horizontal_azimuth", xr.DataArray([]))
-    return bool(azimuths.size == 2 and azimuths.isnull().any())
+    if "horizontal_azimuth" not in station:
+        return False
+    azimuths = station["horizontal_azimuth"].to_numpy()
+    return bool(azimuths.size == 2 and np.isnan(azimuths).any())
 
 
 def _check_match(first: Trace, second: Trace) -> None:

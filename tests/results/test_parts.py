@@ -90,9 +90,9 @@ def test_memory_does_not_grow_with_the_number_of_parts(tmp_path, monkeypatch):
         most.append(len(held))
         return take(rows, number)
 
-    def begun(files, schema, size, merged=parts._merged):
+    def begun(*given, merged=parts._merged):
         held.clear()
-        yield from merged(files, schema, size)
+        yield from merged(*given)
 
     monkeypatch.setattr(parts.WaitingRows, "take", counted)
     monkeypatch.setattr(parts, "_merged", begun)

@@ -171,9 +171,29 @@ def test_a_row_that_cannot_be_followed_costs_only_itself(copied, monkeypatch):
     assert rejected[["kind", "reasons"]].to_numpy().tolist() == [["row", "no end of events"]]
 
 
-def test_without_exact_histories_buildings_are_listed_by_their_pairs(copied):
-    counts = screened(copied, "[screening]\nexact = false\n")
+def test_without_exact_histories_buildings_are_listed_by_their_pairs(copied, monkeypatch):
+    # one in five buildings has no identifier
+    pairs = pd.read_csv(copied / "out" / "pairs.csv", dtype=str)
+    pairs.loc[::5, "building_id_1"] = pairs.loc[::7, "building_id_2"] = ""
+    pairs.to_csv(copied / "pairs.csv", index=False)
+    settings = '[pairs]\nfile = "pairs.csv"\n[screening]\nexact = false\n'
+    counts = screened(copied, settings)
     rows, buildings = table(copied, "rows"), table(copied, "buildings")
+    # numbers are those of the names, then of unnamed buildings by rank and side of their pair
+    risk = table(copied, "risk")
+    ids = risk[["building_id_1", "building_id_2"]].fillna("").to_numpy()
+    places = rows.set_index("pair_id").loc[risk["pair_id"]]
+    ends = places[["building_number_left", "building_number_right"]].to_numpy()
+    ends = np.where(places[["turned"]], ends[:, ::-1], ends)
+    named = np.unique(ids[ids != ""])
+    assert (ends[ids != ""] == np.searchsorted(named, ids[ids != ""])).all()
+    assert ends[ids == ""].tolist() == list(range(named.size, counts["buildings"]))
+    # however many pieces there are, in however many passes they are merged
+    before = content(copied)
+    monkeypatch.setattr("per_obspy.buildings.search.PIECE", 7)
+    monkeypatch.setattr("per_obspy.results.parts.MOST_PARTS", 2)
+    screened(copied, settings)
+    assert content(copied) == before
     assert counts["buildings"] == len(buildings)
     assert rows["impacts"].isna().all()
     assert buildings["amplification_row"].isna().all()
