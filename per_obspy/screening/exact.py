@@ -279,6 +279,9 @@ SCAN_STEP = 0.04
 #: The step before the first damping that is enough is halved so many times: to 4e-5.
 HALVINGS = 10
 
+#: Exact demands at one station that take about as long as one: the kernels run as many together.
+TOGETHER = 32
+
 #: Columns from which the exact demand follows.
 NEEDED = (
     *("azimuth", "gap"),
@@ -304,16 +307,18 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
     # As far as both buildings still vibrate
     most = np.minimum(largest, NEARLY_CRITICAL - np.maximum(*both(table, "damping")))
     enough, low = np.full((2, most.size), np.nan)
+    scan = np.arange(1, int(np.ceil(largest / SCAN_STEP - 1e-9)) + 1)
     # Scan: pairs that are helped or at their limit leave it
     waiting = np.arange(most.size)
-    for step in range(1, int(np.ceil(largest / SCAN_STEP - 1e-9)) + 1):
-        added = np.minimum(step * SCAN_STEP, most[waiting])
+    while scan.size and waiting.size:
+        steps = scan[: max(TOGETHER // waiting.size, 1)]
+        added = np.minimum(steps * SCAN_STEP, most[waiting, None])
         fits = _fits(station, chosen(table, waiting), added)
-        enough[waiting[fits]] = added[fits]
-        low[waiting[fits]] = (step - 1) * SCAN_STEP
-        waiting = waiting[~fits & (added < most[waiting])]
-        if not waiting.size:
-            break
+        helped, first = fits.any(axis=1), fits.argmax(axis=1)
+        enough[waiting[helped]] = added[helped, first[helped]]
+        low[waiting[helped]] = (steps[first[helped]] - 1) * SCAN_STEP
+        waiting = waiting[~helped & (added[:, -1] < most[waiting])]
+        scan = scan[steps.size :]
     _refine(station, table, low, enough)
     return enough
 
@@ -322,21 +327,35 @@ def _refine(station: StationMotion, table: Table, low: FloatArray, enough: Float
     """Refine the least damping by bisection, whose upper end is always enough; NaN stays."""
     # pairs that a damping helps
     helped = np.flatnonzero(np.isfinite(enough))
-    pairs = chosen(table, helped)
-    for _ in range(HALVINGS if helped.size else 0):
-        middle = 0.5 * (low[helped] + enough[helped])
-        fits = _fits(station, pairs, middle)
-        enough[helped[fits]], low[helped[~fits]] = middle[fits], middle[~fits]
+    pairs, number = chosen(table, helped), np.arange(helped.size)
+    left = HALVINGS if helped.size else 0
+    while left:
+        # every damping that the next halvings may ask for
+        halvings = min(max(int(np.log2(TOGETHER / helped.size + 1.0)), 1), left)
+        grid = np.stack([low[helped], enough[helped]], axis=1)
+        for _ in range(halvings):
+            middles = 0.5 * (grid[:, :-1] + grid[:, 1:])
+            grid = np.insert(grid, np.arange(1, len(grid.T)), middles, axis=1)
+        fits = _fits(station, pairs, grid[:, 1:-1])
+        first = np.zeros_like(number)
+        for half in 2 ** np.arange(halvings)[::-1]:
+            first += np.where(fits[number, first + half - 1], 0, half)
+        low[helped], enough[helped] = grid[number, first], grid[number, first + 1]
+        left -= halvings
 
 
 def _fits(station: StationMotion, table: Table, added: FloatArray) -> BoolArray:
-    """Return a mask of the pairs whose exact demand with the added damping is at most the gap."""
-    damping_1, damping_2 = both(table, "damping")
-    damped = {name: table[name] for name in table}
-    damped |= {"damping_1": damping_1 + added, "damping_2": damping_2 + added}
+    """Return where the exact demand with added dampings, (n_pairs, n_added), is at most the gap."""
+    pairs = chosen(table, np.repeat(np.arange(len(added)), len(added.T)))
+    damping_1, damping_2 = both(pairs, "damping")
+    damped = pairs | {
+        "damping_1": damping_1 + added.ravel(),
+        "damping_2": damping_2 + added.ravel(),
+    }
     # The worst azimuth turns as damping is added
-    azimuth = values(table, "azimuth").copy()
+    azimuth = values(damped, "azimuth").copy()
     unknown = np.isnan(azimuth)
     if unknown.any():
         azimuth[unknown] = furthest_azimuth(station, chosen(damped, unknown))
-    return exact_demand(station, damped, azimuth) <= values(table, "gap")
+    fits = exact_demand(station, damped, azimuth) <= values(damped, "gap")
+    return np.asarray(fits.reshape(added.shape))

@@ -185,24 +185,28 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     # No azimuth of a pair is one of sensors that point nobody knows where
     if lacks_azimuths(dataset):
         pairs = pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
-    # demand, by groups of pairs whose azimuth is found alike
+    table = _demands(station, pairs, screening)
+    # measures, flags and population follow from the demand
+    table |= mitigation_columns(station, table, screening.target_amplification)
+    raised = raised_by_record(table, dataset, screening)
+    table |= record_population(station, table, screening)
+    table["probability"] = _not_less_by_assumption(station, pairs, table, screening)
+    table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
+    return {name: column for name, column in table.items() if name not in given}
+
+
+def _demands(station: StationMotion, pairs: Columns, screening: Screening) -> Columns:
+    """Compute the demand, by groups of pairs whose azimuth is found alike."""
     parts = []
     for rows, motion, azimuth_rule in _motions(station, pairs, screening.exact):
         group = chosen(pairs, rows)
         demands = demand_columns(station, group, motion, azimuth_rule, screening.exact)
         parts.append((rows, demands))
-    table = joined(parts)
-    # measures, flags and population follow from the demand
-    table |= mitigation_columns(station, table, screening.target_amplification)
-    raised = raised_by_record(table, dataset, screening)
-    table |= record_population(station, table, screening)
-    table["probability"] = _not_less_by_assumption(dataset, given, table, screening)
-    table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
-    return {name: column for name, column in table.items() if name not in given}
+    return joined(parts)
 
 
 def _not_less_by_assumption(
-    dataset: xr.Dataset, pairs: Columns, table: Columns, screening: Screening
+    station: StationMotion, pairs: Columns, table: Columns, screening: Screening
 ) -> FloatArray:
     """
     Return the probability of contact, above a ``no`` where only an assumed strength makes it one.
@@ -215,8 +219,9 @@ def _not_less_by_assumption(
     rows = np.flatnonzero(is_assumed & (probability < smallest))
     if rows.size:
         block = chosen(pairs, rows)
-        linear = _record_columns(dataset, block | stay_linear(block), screening)["probability"]
-        probability[rows] = np.maximum(probability[rows], np.minimum(linear, smallest))
+        linear = _demands(station, block | stay_linear(block), screening)
+        chance = record_population(station, linear, screening)["probability"]
+        probability[rows] = np.maximum(probability[rows], np.minimum(chance, smallest))
     return probability
 
 
