@@ -4,7 +4,6 @@ Compilation of kernels ahead of use: of all in parts, or of screening during a r
 The parts share few kernels, so that processes can compile them next to each other.
 """
 
-import gc
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from per_obspy.garbage import keep_all, no_search
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.pounding.correlation import worst_azimuth
 from per_obspy.pounding.pair_histories import pounding_histories
@@ -122,13 +122,9 @@ PARTS: dict[str, Callable[[], None]] = {
 
 def compile_part(name: str) -> str:
     """Compile one of `PARTS` and return its name."""
-    # Compilation makes many objects and few cycles: searches for them free next to nothing
-    gc.disable()
-    try:
+    with no_search():
         PARTS[name]()
-        gc.freeze()
-    finally:
-        gc.enable()
+    keep_all()
     return name
 
 

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from per_obspy.garbage import keep_all, no_search
+
 if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
 
@@ -39,6 +41,15 @@ def forked_workers() -> Iterator[None]:
         yield
     finally:
         _forks["workers"] = earlier
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Load libraries in a block; those of a program are left out of later searches for garbage."""
+    with no_search():
+        yield
+    if _forks["workers"]:
+        keep_all()
 
 
 def worker_context() -> "BaseContext":
