@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def no_search() -> Iterator[None]:
-    """Search no cycles while a block makes many objects that stay, as imports and compilation do."""
+    """Search no cycles while a block makes many objects that stay, as an import does."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -19,14 +19,7 @@ if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
 
 #: Modules that load everything that a job needs.
-LOADED = (
-    "per_obspy.runs.tasks.station",
-    "per_obspy.runs.tasks.chunk",
-    "per_obspy.runs.tasks.building_rows",
-    "obspy.taup",
-    "obspy.signal.invsim",
-    "obspy.signal.trigger",
-)
+LOADED = ("per_obspy.runs.tasks.worker_libraries",)
 
 #: Whether workers of this process are forks of its server.
 _forks = {"workers": False}
