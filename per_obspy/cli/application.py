@@ -27,6 +27,7 @@ from per_obspy.cli.show import show
 from per_obspy.cli.watch import status, watch
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
+from per_obspy.garbage import keep_all
 from per_obspy.machine import machine_fault
 from per_obspy.runs.tasks.worker_start import forked_workers
 from per_obspy.termination import (
@@ -96,6 +97,8 @@ def main() -> None:
         _drop_output()
     except WriteError as error:
         code = _failed_output(error)
+    # Searching all libraries for cycles would take half a second, and their memory ends with this
+    keep_all()
     raise SystemExit(code)
 
 

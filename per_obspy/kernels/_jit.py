@@ -62,6 +62,32 @@ class SharedCache(FunctionCache):
             with FileLock(str(Path(self.cache_path) / ".lock")):
                 super().save_overload(sig, data)
 
+    def stored_signatures(self, target_context: Any) -> list[Any]:
+        """Return the signatures that are stored for this version and processor."""
+        codegen = target_context.codegen()
+        keys = list(self._cache_file._load_index())
+        return [key[0] for key in keys if key == self._index_key(key[0], codegen)]
+
+
+#: Every kernel that Python may call.
+_kernels = list[Any]()
+
+
+def load_stored() -> None:
+    """Load the code of all kernels that is stored, for all processes that begin as a copy."""
+    # Another Numba: each process loads what it calls
+    with suppress(AttributeError, TypeError):
+        for kernel in _kernels:
+            for signature in kernel._cache.stored_signatures(kernel.targetctx):
+                kernel.compile(signature)
+
+
+def are_stored(*kernels: Any) -> bool:
+    """Return whether code of all these kernels is stored, so that it is only loaded."""
+    with suppress(AttributeError, TypeError):
+        return all(one.kernel._cache.stored_signatures(one.kernel.targetctx) for one in kernels)
+    return False
+
 
 def can_be_stored() -> bool:
     """Return whether there is a folder in which compiled kernels can be stored."""
@@ -86,6 +112,7 @@ def _compiler(
             if kernel is function:
                 return function
             kernel._cache = SharedCache(function)
+            _kernels.append(kernel)
         except RuntimeError as error:
             # Neither the package's folder nor that of the user can be written
             if NO_FOLDER not in str(error):

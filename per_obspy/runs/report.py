@@ -71,7 +71,7 @@ def explained(
             with ranked_table(files) as table:
                 names = [name for name in table.schema.names if known_column(name)]
                 worst = table.first(PAGE_PAIRS, names)
-            drawings = page_drawings(context.settings, worst, stations, ground)
+            drawings = page_drawings(context.settings, worst, stations, ground, context.workers)
             write_drawings(drawings, folder / WORST_PAIRS)
     return report
 

@@ -26,6 +26,7 @@ from per_obspy.runs.output_folder import (
 )
 from per_obspy.runs.provenance import RunSettings
 from per_obspy.runs.tasks.parallel import Workers, prepare_workers
+from per_obspy.runs.tasks.worker_start import loading
 
 if TYPE_CHECKING:
     from per_obspy.records.fdsn.cache import Fetched
@@ -90,7 +91,8 @@ def run(
                 return Result(folder, known, did_nothing=True)
 
         _prepare_workers(asked.settings, executor)
-        from per_obspy.runs.stages import new_run
+        with loading():
+            from per_obspy.runs.stages import new_run
 
         return new_run(asked, asked.context(executor, progress), fetched, head, facts or {})
 
@@ -113,7 +115,8 @@ def screen(
         _require_stations(asked.folder)
         asked.use_fetched_map()
         _prepare_workers(asked.settings, executor)
-        from per_obspy.runs.stages import new_screening
+        with loading():
+            from per_obspy.runs.stages import new_screening
 
         return new_screening(asked, asked.context(executor, progress))
 
@@ -133,7 +136,8 @@ def report(
     with locked_folder(asked.folder):
         record = _finished(asked.folder / RECORD)
         asked.use_fetched_map()
-        from per_obspy.runs.stages import new_report
+        with loading():
+            from per_obspy.runs.stages import new_report
 
         return new_report(asked.context(None, progress), record)
 

@@ -3,10 +3,11 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
+from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pyarrow.parquet as pq
 
 from per_obspy.config import Records, Run
@@ -32,6 +33,7 @@ from per_obspy.runs.tasks.ground_files import GroundFiles, ground_files
 from per_obspy.runs.tasks.parallel import finish
 from per_obspy.runs.tasks.parts import Part, rejections, remove_other_parts
 from per_obspy.runs.tasks.station import FinishedStation, hypocentre_attributes
+from per_obspy.screening.assignment import nearest_station
 from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.site_motion import Hypocentre, hypocentre_of
 
@@ -41,6 +43,9 @@ CHUNKS_PER_WORKER = 4
 #: Rows of a chunk at least: preparing the records of 24 stations anew takes as long as 3 000 rows
 #: with estimates.
 SMALLEST_CHUNK = 10_000
+
+#: Rows of a share of a chunk with exact histories at least, each of which takes a millisecond.
+SMALLEST_SHARE = 250
 
 KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
@@ -124,7 +129,7 @@ def screened(
         # Rows of buildings are read from it
         rows = building_rows(context, ground, facts)
         outputs += risk.files + rows.outputs
-    left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
+    left_out = chain(rejected, unplaced, _in_order(parts, _shares(context)), rows.rejected)
     counts = _counts(risk.states, write_rejected(left_out, outputs[0]), parts, rows)
     counts |= _damage_counts(settings, risk)
     return Screened(
@@ -223,7 +228,14 @@ def _parts(context: RunContext, ground: GroundFiles) -> tuple[list[Part], PairNo
     parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
     tally = CoverageTally(search_of_tables(inventory.rows))
     size = _chunk_rows(inventory.count, context.workers.count)
-    tasks = _tasks(settings, folder, ground, inventory.chunks(size), raw)
+    shares = _shares(context)
+    chunks = enumerate(inventory.chunks(size))
+    pieces = (
+        (shares * number + place, share)
+        for number, chunk in chunks
+        for place, share in enumerate(_shared(chunk, ground, shares))
+    )
+    tasks = _tasks(settings, folder, ground, pieces, raw)
     for part in finish(tasks, context.workers):
         parts.append(part)
         rows += part.rows
@@ -267,16 +279,47 @@ def _chunk_rows(count: int, workers: int) -> int:
     return min(SMALLEST_CHUNK << round(math.log2(share / SMALLEST_CHUNK)), CHUNK)
 
 
+def _shares(context: RunContext) -> int:
+    """Return the number of shares of a chunk: exact histories keep every worker busy with one."""
+    return context.workers.count if context.settings.screening.exact else 1
+
+
+def _shared(chunk: PairChunk, ground: GroundFiles, most: int) -> list[PairChunk]:
+    """Return a chunk in shares of about as many rows, of which each has most stations alone."""
+    count = min(most, len(chunk.repeated) // SMALLEST_SHARE)
+    if count < 2 or not ground.stations:
+        return [chunk]
+    # Rows without a place go with the others of one station
+    place = [chunk.rows.table[f"{name}_1"].to_numpy() for name in ("longitude", "latitude")]
+    stations = np.array([(one.longitude, one.latitude) for one in ground.stations]).T
+    nearest, _ = nearest_station(*np.nan_to_num(place), *stations)
+    shares = []
+    for number, rows in enumerate(np.array_split(np.argsort(nearest, kind="stable"), count)):
+        rows.sort()
+        raw = chunk.rows
+        raw = raw._replace(
+            table=raw.table.take(rows), lines=raw.lines[rows], broken=() if number else raw.broken
+        )
+        shares.append(PairChunk(raw, chunk.repeated[rows], chunk.odd[rows]))
+    return shares
+
+
+def _in_order(parts: Sequence[Part], shares: int) -> Iterator[Rejection]:
+    """Yield the rejections of parts, those of the shares of one chunk in the order of its lines."""
+    for _, group in groupby(parts, lambda part: part.number // shares):
+        yield from sorted(rejections(group), key=lambda one: one.row or math.inf)
+
+
 def _tasks(
     settings: Run,
     folder: Path,
     ground: GroundFiles,
-    chunks: Iterator[PairChunk],
+    chunks: Iterable[tuple[int, PairChunk]],
     raw: dict[int, RawRows],
 ) -> Iterator[ChunkTask]:
-    """Yield one task per chunk of the inventory, and keep its rows until it is done."""
+    """Yield one task per numbered chunk of the inventory, and keep its rows until it is done."""
     after = earlier_result(settings)
-    for number, chunk in enumerate(chunks):
+    for number, chunk in chunks:
         raw[number] = chunk.rows
         part = _chunk_folder(folder) / f"{number:06}.parquet"
         yield ChunkTask(

@@ -6,9 +6,11 @@ They are computed once, after the screening, and kept in ``worst_pairs.json``.
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -23,10 +25,13 @@ from per_obspy.pounding.structure import Structure
 from per_obspy.report.results import Drawings
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import GroundFiles, read_ground, read_station_once
+from per_obspy.runs.tasks.parallel import Workers, called
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
 from per_obspy.screening.values import components, motion_along
+
+Found = TypeVar("Found")
 
 #: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
 HISTORIES = 100
@@ -37,6 +42,9 @@ SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
 #: Pairs whose sensitivity is computed, 0.06 s each: the worst ones, and those whose probability is
 #: nearest to a half, of which a better input may turn the verdict.
 WORST, DOUBTFUL = 100, 50
+
+#: Pairs with sensitivities from which on other processes share the work.
+MANY = 40
 
 #: Stations whose record is drawn, those that serve most pairs: 5 kB each.
 STATIONS = 40
@@ -83,6 +91,7 @@ def page_drawings(
     worst: pd.DataFrame,
     stations: Sequence[FinishedStation],
     ground: GroundFiles,
+    workers: Workers,
 ) -> Drawings:
     """
     Return records and spectra of stations, and histories and sensitivities of pairs.
@@ -97,26 +106,45 @@ def page_drawings(
         With station files.
     ground : GroundFiles
         The ground motion of the run.
+    workers : Workers
+        Who computes histories and sensitivities.
     """
-    histories, radii = pair_histories(worst, stations), _radii(stations)
+    radii, followed = _radii(stations), _histories(worst, stations)
     if "probability" not in worst or "derived" not in worst:
-        return Drawings({}, histories, radii=radii)
+        return Drawings({}, joined(call() for call in followed), radii=radii)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
-    rows = _sensitivities(chosen, read_ground(ground), settings)
+    # For few pairs no process is started, and those of a cluster are far away
+    is_near = workers.executor is None and len(chosen) >= MANY
+    near = workers if is_near else Workers(1)
+    # One share of the sensitivities per worker, which take longest, station by station
+    by_station = chosen.sort_values("station", kind="stable")
+    edges = np.linspace(0, len(chosen), near.count + 1).astype(int)
+    varied = [
+        partial(_sensitivities, by_station.iloc[first:end], ground, settings)
+        for first, end in pairwise(edges)
+    ]
+    found: list[Any] = called([*varied, *followed], near)
+    sensitivity, histories = joined(found[: near.count]), joined(found[near.count :])
     counts = min(len(known), WORST), len(doubt)
-    return Drawings(_station_drawings(worst, stations), histories, rows, *counts, radii)
+    drawn = _station_drawings(worst, stations)
+    return Drawings(drawn, histories, sensitivity, *counts, radii)
+
+
+def joined(parts: Iterable[Mapping[int, Found]]) -> dict[int, Found]:
+    """Return what was found of pairs, by their rank."""
+    return dict(sorted(chain.from_iterable(part.items() for part in parts)))
 
 
 def _sensitivities(
-    pairs: pd.DataFrame, ground: RegionalMotion, settings: Run
+    pairs: pd.DataFrame, files: GroundFiles, settings: Run
 ) -> dict[int, list[list[Any]]]:
     """Return the sensitivities of pairs by their rank, the largest change first."""
     ranks = dict(zip(pairs["pair_id"], pairs["rank"], strict=True))
     found: dict[int, list[list[Any]]] = {}
-    for one in _each(pairs, ground, settings):
+    for one in _each(pairs, read_ground(files), settings):
         ends = [float(f"{value:.4g}") for value in (one.low, one.high)]
         chances = [round(value, 4) for value in (one.probability_low, one.probability_high)]
         row = [one.name, *ends, *chances, one.state_low, one.state_high]
@@ -170,22 +198,31 @@ def pair_histories(
     stations : iterable of FinishedStation
         With station files.
     """
+    return joined(call() for call in _histories(worst, stations))
+
+
+def _histories(
+    worst: pd.DataFrame, stations: Iterable[FinishedStation]
+) -> list[partial[dict[int, dict[str, Any]]]]:
+    """Return the calls that compute the histories of pairs, station by station."""
     if not set(HISTORY_COLUMNS) <= set(worst):
-        return {}
+        return []
     usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
     shards = {station.shard.stem: station for station in stations if station.shard}
-    histories = {}
-    # Station by station, because motions are large
+    calls = []
     for name, pairs in usable.groupby("station", sort=False):
         station = shards.get(file_stem(str(name)))
-        if station is None or station.shard is None:
-            continue
-        motion = read_station_once(station.shard, station.hash)
-        for _, pair in pairs.iterrows():
-            history = drawn_history(motion, pair)
-            if history is not None:
-                histories[int(pair["rank"])] = history
-    return histories
+        if station is not None and station.shard is not None:
+            columns = pairs[[*HISTORY_COLUMNS]]
+            calls.append(partial(_histories_at, columns, station.shard, station.hash))
+    return calls
+
+
+def _histories_at(pairs: pd.DataFrame, shard: Path, digest: str) -> dict[int, dict[str, Any]]:
+    """Return the histories of pairs under the record of one station."""
+    motion = read_station_once(shard, digest)
+    drawn = {int(pair["rank"]): drawn_history(motion, pair) for _, pair in pairs.iterrows()}
+    return {rank: history for rank, history in drawn.items() if history is not None}
 
 
 def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:

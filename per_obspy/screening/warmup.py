@@ -4,7 +4,6 @@ Compilation of kernels ahead of use: of all in parts, or of screening during a r
 The parts share few kernels, so that processes can compile them next to each other.
 """
 
-import gc
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,12 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from per_obspy.garbage import keep_all, no_search
 from per_obspy.inventory.checking import checked_pairs
+from per_obspy.kernels._jit import are_stored
+from per_obspy.kernels.pairs.single_hit import estimate
+from per_obspy.kernels.pounding_lanes.run_block import run_lanes
+from per_obspy.kernels.relative.relative_maxima import relative_maxima
 from per_obspy.pounding.correlation import worst_azimuth
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.relative import (
@@ -87,9 +91,17 @@ def _spectra() -> None:
     azimuthal_sd_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])
 
 
+#: Kernels of screening that take longest to compile, one of each part.
+LONGEST = run_lanes, relative_maxima, estimate
+
+
 @contextmanager
 def compiling(progress: Progress) -> Iterator[None]:
     """Compile the kernels of screening in a thread, while other processes do the stations."""
+    # Workers load what is stored
+    if are_stored(*LONGEST):
+        yield
+        return
     # Where Dask is installed, xarray imports it with the first Dataset: two threads that both make
     # their first one would break this import
     _station()
@@ -122,13 +134,9 @@ PARTS: dict[str, Callable[[], None]] = {
 
 def compile_part(name: str) -> str:
     """Compile one of `PARTS` and return its name."""
-    # Compilation makes many objects and few cycles: searches for them free next to nothing
-    gc.disable()
-    try:
+    with no_search():
         PARTS[name]()
-        gc.freeze()
-    finally:
-        gc.enable()
+    keep_all()
     return name
 
 

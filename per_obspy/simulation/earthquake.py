@@ -309,9 +309,20 @@ def _spectra(
 
 def scenario_inventory(scenario: Scenario, stations: list[SimulatedStation]) -> Inventory:
     """Return the stations with a flat response; their ground is in ``geology`` and a comment."""
+    units = {"input_units": "M/S**2", "output_units": "COUNTS"}
+    # No poles, no zeros and one gain; ``from_paz`` would load half a second of libraries
+    response = stationxml.Response(
+        instrument_sensitivity=stationxml.InstrumentSensitivity(GAIN, 1.0, **units),
+        response_stages=[
+            stationxml.PolesZerosResponseStage(
+                1, GAIN, 1.0, **units, pz_transfer_function_type="LAPLACE (RADIANS/SECOND)",
+                normalization_frequency=1.0, zeros=[], poles=[],
+            )
+        ],
+    )  # fmt: skip
     network = stationxml.Network(
         NETWORK,
-        stations=[_station_metadata(scenario, station) for station in stations],
+        stations=[_station_metadata(scenario, station, response) for station in stations],
         description=NOTICE,
         comments=[stationxml.Comment(NOTICE)],
     )
@@ -319,16 +330,16 @@ def scenario_inventory(scenario: Scenario, stations: list[SimulatedStation]) -> 
     return Inventory([network], source=NOTICE, sender="per_obspy", created=created)
 
 
-def _station_metadata(scenario: Scenario, station: SimulatedStation) -> stationxml.Station:
-    """Return a station with three channels: no poles, no zeros, one gain."""
+def _station_metadata(
+    scenario: Scenario, station: SimulatedStation, response: stationxml.Response
+) -> stationxml.Station:
+    """Return a station with three channels of the same response."""
     place = {"latitude": station.latitude, "longitude": station.longitude, "elevation": 0.0}
     channels = []
     for code, (azimuth, dip) in CHANNELS.items():
         channel = stationxml.Channel(code, "", **place, depth=0.0, azimuth=azimuth, dip=dip)
         channel.sample_rate = 1.0 / scenario.dt
-        channel.response = stationxml.Response.from_paz(
-            [], [], GAIN, input_units="M/S**2", output_units="COUNTS"
-        )
+        channel.response = response
         channels.append(channel)
     # The records module reads the site class from a comment
     soil = "rock" if station.lakebed is None else "lakebed"

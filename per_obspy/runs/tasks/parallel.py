@@ -18,7 +18,7 @@ Few tasks are ahead of the results that were taken, so that a long row of them n
 import os
 import signal
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -178,6 +178,35 @@ def _all_results(
             unfinished = yield from _on(pool, waiting, watched, lambda: AHEAD * count)
         for task in unfinished:
             yield from _alone(task, watched)
+
+
+def called(calls: Sequence[Callable[[], Result]], workers: Workers) -> list[Result]:
+    """
+    Return the results of some calls, in their order; an error of one is an error of all.
+
+    Other processes must be able to load the calls, such as those of ``functools.partial``.
+
+    Raises
+    ------
+    RuntimeError
+        If a call fails.
+    Unfinished
+        If the machine failed in a call.
+    """
+    found = dict(results(enumerate(calls), Work(_numbered, _raised), workers))
+    return [found[number] for number in range(len(calls))]
+
+
+def _numbered(task: tuple[int, Callable[[], Result]]) -> tuple[int, Result]:
+    """Return the result of a call with its number."""
+    number, call = task
+    return number, call()
+
+
+def _raised(task: object, reason: str) -> Any:
+    """Raise an error with the reason why a call failed."""
+    del task
+    raise RuntimeError(reason)
 
 
 def prepare_workers(workers: int) -> None:

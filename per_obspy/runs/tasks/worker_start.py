@@ -13,18 +13,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from per_obspy.garbage import keep_all, no_search
+
 if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
 
 #: Modules that load everything that a job needs.
-LOADED = (
-    "per_obspy.runs.tasks.station",
-    "per_obspy.runs.tasks.chunk",
-    "per_obspy.runs.tasks.building_rows",
-    "obspy.taup",
-    "obspy.signal.invsim",
-    "obspy.signal.trigger",
-)
+LOADED = ("per_obspy.runs.tasks.worker_libraries",)
 
 #: Whether workers of this process are forks of its server.
 _forks = {"workers": False}
@@ -39,6 +34,15 @@ def forked_workers() -> Iterator[None]:
         yield
     finally:
         _forks["workers"] = earlier
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Load libraries in a block; those of a program are left out of later searches for garbage."""
+    with no_search():
+        yield
+    if _forks["workers"]:
+        keep_all()
 
 
 def worker_context() -> "BaseContext":
