@@ -233,15 +233,11 @@ def _unknown(content: bytes) -> str:
         if content.startswith(mark):
             return f"it is packed by {packer}: unpack it first"
     problem = f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
-    if _has_plain_numbers(content):
+    # Lines of numbers alone, after the first ones
+    lines = content[:4096].decode("ascii", "replace").splitlines()[TITLES:-1]
+    if len(lines) > 1 and all(map(_NUMBERS.fullmatch, lines)):
         return f"{problem}; a table of samples is read where [[records.columns]] describes it"
     return problem
-
-
-def _has_plain_numbers(content: bytes) -> bool:
-    """Return whether lines of numbers alone follow the first lines of a text."""
-    lines = content[:4096].decode("ascii", "replace").splitlines()[TITLES:-1]
-    return len(lines) > 1 and all(map(_NUMBERS.fullmatch, lines))
 
 
 def _reason(error: Exception) -> str:
