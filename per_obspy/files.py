@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
-from per_obspy.errors import PerError, WriteError, WrongOutput
+from per_obspy.errors import CatalogError, PerError, WriteError, WrongOutput, reason_of
 
 #: How files of other kinds begin.
 SIGNATURES = {
@@ -157,6 +157,17 @@ def _remove_part(part: Path) -> None:
     """Remove a part file; where even that fails, a later run removes it."""
     with suppress(OSError):
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn a failure to read a file or folder into ``CatalogError``, one line with the reason."""
+    try:
+        yield
+    except PerError:
+        raise
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
 
 
 @contextmanager

@@ -17,13 +17,12 @@ import typer
 import per_obspy
 from per_obspy.cli.info import info
 from per_obspy.cli.init import init, warm_up
-from per_obspy.cli.observed import observed
 from per_obspy.cli.pairs import catalog, pairs
 from per_obspy.cli.printing import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.cli.records import events, fetch
+from per_obspy.cli.results import observed, show
 from per_obspy.cli.run import process, report, run, simulate, spectra
 from per_obspy.cli.screen import screen
-from per_obspy.cli.show import show
 from per_obspy.cli.watch import status, watch
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -312,7 +311,7 @@ def print_result(result: "Result") -> None:
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
-        _print_worst(folder, 10)
+        _print_worst(folder)
     print(printable(f"per-obspy run {folder / 'configuration.toml'} does it again."))
     print_files(folder, {*record["outputs"], "run.json", "configuration.toml"})
 
@@ -438,11 +437,16 @@ def _print_evaluation(found: dict[str, Any]) -> None:
         print(f"Brier score {found['brier_score']:.3f}; the share alone {share_alone:.3f}")
 
 
-def _print_worst(folder: Path, count: int) -> None:
+def _print_worst(folder: Path) -> None:
     """Print the worst pairs as a table."""
-    titles = list(SHOWN.values())
-    worst = [tuple(map(_said, SHOWN, row)) for row in _worst_rows(folder, list(SHOWN), count)]
-    print_worst(titles, worst)
+    # Without libraries of tables, which a finished run would wait for
+    from per_obspy.results.ranked_table import ranked_table, table_files
+
+    with ranked_table(table_files(folder)) as table:
+        found = [row for rows in table.ranked(10, list(SHOWN)) for row in rows.to_pylist()]
+    # In the order of the columns that was asked for
+    worst = [tuple(map(_said, SHOWN, map(row.get, SHOWN))) for row in found]
+    print_worst(list(SHOWN.values()), worst)
     print(
         "Ranked by impact, doubled where floors meet columns, half as much again where a tall "
         "building stands beside a low one."
@@ -456,14 +460,3 @@ def _said(name: str, value: object) -> object:
     # The contact law allows no more
     is_known = isinstance(value, float) and value == value
     return f"{value:.2g}" if name.startswith("expected_") and is_known else value
-
-
-def _worst_rows(folder: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
-    """Return the worst rows of the risk table; empty cells are None."""
-    # Without libraries of tables, which a finished run would wait for
-    from per_obspy.results.ranked_table import ranked_table, table_files
-
-    with ranked_table(table_files(folder)) as table:
-        found = [row for rows in table.ranked(count, columns) for row in rows.to_pylist()]
-    # In the order of the columns that was asked for
-    return list(map(itemgetter(*columns), found))

@@ -18,7 +18,7 @@ from per_obspy.cli.printing import (
     named_path,
     shown_progress,
 )
-from per_obspy.errors import PerError, TryLater, printable
+from per_obspy.errors import TryLater, printable
 from per_obspy.watch.logs import log_progress, logging_to
 
 if TYPE_CHECKING:
@@ -158,13 +158,9 @@ def watch(
 
         settings = on_cluster(read_settings(configuration), dask)
         if once:
-            _raise_worst(watch_once(settings, progress=progress).errors)
+            errors = watch_once(settings, progress=progress).errors
+            # The exit code is that of an error that passes, or else of the first
+            for error in sorted(errors, key=lambda error: not isinstance(error, TryLater)):
+                raise error
         else:
             watch_forever(settings, progress=progress)
-
-
-def _raise_worst(errors: tuple[PerError, ...]) -> None:
-    """Raise the error that decides the exit code: one that passes, or else the first."""
-    passing = [error for error in errors if isinstance(error, TryLater)]
-    for error in [*passing, *errors][:1]:
-        raise error

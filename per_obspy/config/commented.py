@@ -195,9 +195,10 @@ def _tables(section: type[Section], content: Mapping[str, Any], prefix: str) -> 
             continue
         # A repeated table has one block per entry
         path, given = f"{prefix}{name}", content.get(name)
-        repeated = _is_repeated(field)
+        repeated = Ellipsis in get_args(field.annotation)
         entries: list[Mapping[str, Any]] = list(given or []) if repeated else [given or {}]
-        is_set = given is not None or _has_default(field, model)
+        # A table that exists without its header loses nothing by it
+        is_set = given is not None or (isinstance(field.default, Section) and _all_default(model))
         for entry in entries or [{}]:
             block = _block(field, model, entry, (path, repeated))
             shown = is_set and bool(entries)
@@ -231,19 +232,9 @@ def _model(field: FieldInfo) -> type[Section] | None:
     return None if is_inline else model
 
 
-def _has_default(field: FieldInfo, model: type[Section]) -> bool:
-    """Return whether a table exists without its header, so that the header has no effect."""
-    return isinstance(field.default, Section) and _all_default(model)
-
-
 def _all_default(model: type[Section]) -> bool:
     """Return whether every key of a table has a default."""
     return not any(field.is_required() for field in model.model_fields.values())
-
-
-def _is_repeated(field: FieldInfo) -> bool:
-    """Return whether a table may stand several times."""
-    return Ellipsis in get_args(field.annotation)
 
 
 def _default(field: FieldInfo) -> str:

@@ -1,7 +1,7 @@
 """Pairs of a run: tables, simulated inventories and rows of buildings."""
 
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import (
     Field,
@@ -9,7 +9,7 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.section import RelativePath, Section
+from per_obspy.config.section import Latitude, Longitude, RelativePath, Section
 
 
 class Scenario(Section):
@@ -24,8 +24,8 @@ class Scenario(Section):
     name: str = Field("Simulated earthquake", description="of the event")
     magnitude: float = Field(7.0, ge=4, le=8.5, description="moment magnitude")
     origin_time: str = Field("2000-01-01T00:00:00", description="ISO 8601, UTC")
-    latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
-    longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
+    latitude: Latitude = Field(0.0, description="of the epicentre, degrees north")
+    longitude: Longitude = Field(0.0, description="of the epicentre, degrees east")
     depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
     quality: float = Field(180.0, gt=0, le=1e5, description="Q at 1 Hz (Raoof and others 1999)")
     quality_exponent: float = Field(
@@ -33,19 +33,11 @@ class Scenario(Section):
     )
     kappa: float = Field(0.035, ge=0, le=1, description="s; generic rock (Boore & Joyner 1997)")
     stations: int = Field(24, ge=1, le=999, description="number of stations")
-    city_latitude: float = Field(
-        0.0, ge=-90, le=90, description="centre of the stations, degrees north"
-    )
-    city_longitude: float = Field(
-        0.3, ge=-180, le=180, description="centre of the stations, degrees east"
-    )
+    city_latitude: Latitude = Field(0.0, description="centre of the stations, degrees north")
+    city_longitude: Longitude = Field(0.3, description="centre of the stations, degrees east")
     city_radius: float = Field(12_000.0, gt=0, le=1e6, description="m")
-    lakebed_latitude: float = Field(
-        0.0, ge=-90, le=90, description="centre of the lakebed, degrees north"
-    )
-    lakebed_longitude: float = Field(
-        0.3, ge=-180, le=180, description="centre of the lakebed, degrees east"
-    )
+    lakebed_latitude: Latitude = Field(0.0, description="centre of the lakebed, degrees north")
+    lakebed_longitude: Longitude = Field(0.3, description="centre of the lakebed, degrees east")
     lakebed_radius: float = Field(6_000.0, ge=0, le=1e6, description="m; 0: no lakebed")
     lakebed_frequency: float = Field(
         0.5, gt=0, le=50, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6"
@@ -160,10 +152,6 @@ def box_of(text: str, box: tuple[float, ...]) -> tuple[float, float, float, floa
     raise ValueError(f"{text} is not W,S,E,N in degrees with W < E (not across 180) and S < N")
 
 
-#: Longitude, or latitude.
-Degrees = Annotated[float, Field(ge=-180, le=180)]
-
-
 class Footprints(Section):
     """Outlines of buildings, of which neighbours are the pairs."""
 
@@ -186,7 +174,7 @@ class Footprints(Section):
             'columns of the layer: quantity of a building = "column", such as height = "altura"'
         ),
     )
-    bbox: tuple[Degrees, Degrees, Degrees, Degrees] | None = Field(
+    bbox: tuple[Longitude, Latitude, Longitude, Latitude] | None = Field(
         None,
         description=(
             "box [W, S, E, N], degrees: only buildings that touch it, of GeoParquet with a column "

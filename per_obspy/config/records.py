@@ -9,7 +9,7 @@ from pydantic import (
     model_validator,
 )
 
-from per_obspy.config.section import Moment, RelativePath, Section
+from per_obspy.config.section import Latitude, Longitude, Moment, RelativePath, Section
 from per_obspy.names import code_problem, public_url
 from per_obspy.units import motion_unit
 
@@ -36,8 +36,8 @@ class Columns(Section):
     )
     network: str = Field("", description="SEED network code: letters, digits, - and _")
     station: str = Field(description="SEED station code: letters, digits, - and _")
-    latitude: float = Field(ge=-90, le=90, description="latitude of the station, degrees north")
-    longitude: float = Field(ge=-180, le=180, description="longitude of the station, degrees east")
+    latitude: Latitude = Field(description="latitude of the station, degrees north")
+    longitude: Longitude = Field(description="longitude of the station, degrees east")
     units: str = Field(description="unit of the samples: m/s2, cm/s2, gal or g")
     channels: dict[str, Annotated[int, Field(ge=0, le=10_000)]] = Field(
         description="column of each channel, counted from 0: channel code = column"

@@ -12,6 +12,7 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Field,
     PlainSerializer,
     SerializationInfo,
     ValidationError,
@@ -55,6 +56,8 @@ def _language(name: str) -> str:
     return name
 
 
+Latitude = Annotated[float, Field(ge=-90, le=90)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
 Language = Annotated[str, AfterValidator(_language)]
 Moment = Annotated[str, AfterValidator(_moment)]
 RelativePath = Annotated[

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from per_obspy.config.records import Provider
-from per_obspy.config.section import Language, RelativePath, Section
+from per_obspy.config.section import Language, Latitude, Longitude, RelativePath, Section
 from per_obspy.constants import LANGUAGES
 
 
@@ -28,8 +28,8 @@ class Reach(Section):
 class Region(Section):
     """Circle in place of the inventory, where its pairs are not in a table or catalogue."""
 
-    latitude: float = Field(ge=-90, le=90, description="latitude of the centre, degrees north")
-    longitude: float = Field(ge=-180, le=180, description="longitude of the centre, degrees east")
+    latitude: Latitude = Field(description="latitude of the centre, degrees north")
+    longitude: Longitude = Field(description="longitude of the centre, degrees east")
     radius: float = Field(
         0.0,
         ge=0,

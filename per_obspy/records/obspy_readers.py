@@ -27,7 +27,7 @@ from per_obspy.files import scratch_folder, writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
-from per_obspy.records.archive import LIMITS, SMALL, read_file, unpacked
+from per_obspy.records.archive import LIMITS, SMALL, unpacked
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -80,14 +80,16 @@ _OTHER_PACKERS = {b"\xfd7zXZ\x00": "xz", b"\x28\xb5\x2f\xfd": "Zstandard", b"7z\
 LARGEST_UNPACKED = 512 * 1024**2
 
 
-def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
+def read_content(reader: Callable[..., Any], content: bytes, path: Path, **options: Any) -> Any:
     """
-    Call a reader of ObsPy on a file, or on a member of an archive.
+    Call a reader of ObsPy on the bytes of a file, so that the file itself is opened only once.
 
     Parameters
     ----------
     reader : callable
         ``obspy.read``, ``obspy.read_inventory`` or ``obspy.read_events``.
+    content : bytes
+        Of the file, perhaps packed by gzip or bzip2.
     path : Path
         File, or a member of an archive as ``records.archive`` names it.
     **options
@@ -98,16 +100,6 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
     RecordRejected
         Whatever the reader raises.
     """
-    return read_content(reader, read_file(path), path, **options)
-
-
-def read_content(reader: Callable[..., Any], content: bytes, path: Path, **options: Any) -> Any:
-    """
-    Call a reader of ObsPy on the bytes of a file, so that the file itself is opened only once.
-
-    Parameters and errors are those of :func:`read_with_obspy`; gzip or bzip2 may have packed the
-    content.
-    """
     return read_bytes_with_obspy(reader, _unpacked(content, path), path, **options)
 
 
@@ -117,7 +109,7 @@ def read_bytes_with_obspy(
     """
     Call a reader of ObsPy on the answer of a service, or on a part of a file.
 
-    Parameters and errors are those of :func:`read_with_obspy`; the source of the content is named
+    Parameters and errors are those of :func:`read_content`; the source of the content is named
     in messages. Errors of ObsPy's bare Exception, or of any library below, reject.
     """
     kind = _KINDS[reader.__name__]
@@ -233,15 +225,11 @@ def _unknown(content: bytes) -> str:
         if content.startswith(mark):
             return f"it is packed by {packer}: unpack it first"
     problem = f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
-    if _has_plain_numbers(content):
+    # Lines of numbers alone, after the first ones
+    lines = content[:4096].decode("ascii", "replace").splitlines()[TITLES:-1]
+    if len(lines) > 1 and all(map(_NUMBERS.fullmatch, lines)):
         return f"{problem}; a table of samples is read where [[records.columns]] describes it"
     return problem
-
-
-def _has_plain_numbers(content: bytes) -> bool:
-    """Return whether lines of numbers alone follow the first lines of a text."""
-    lines = content[:4096].decode("ascii", "replace").splitlines()[TITLES:-1]
-    return len(lines) > 1 and all(map(_NUMBERS.fullmatch, lines))
 
 
 def _reason(error: Exception) -> str:

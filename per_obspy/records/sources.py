@@ -15,7 +15,6 @@ from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.processing.account import rejection, taken
-from per_obspy.progress import Progress, silent
 from per_obspy.records.archive import hash_if_readable
 from per_obspy.records.asdf import find_asdf_stations, has_event
 from per_obspy.records.earthquakes.groups import (
@@ -25,7 +24,7 @@ from per_obspy.records.earthquakes.groups import (
     reader_of_event,
 )
 from per_obspy.records.earthquakes.quakeml import EventFile, read_event_file
-from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
+from per_obspy.records.fdsn.cache import FDSN, Fetched, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import Files, Reader, RecordSource, find_stations
 from per_obspy.records.metadata import merged_inventory
@@ -91,11 +90,6 @@ class Sources(NamedTuple):
     waiting: tuple[Path, ...] = ()
 
 
-def fetched_records(records: config.Records | None, progress: Progress = silent) -> Fetched | None:
-    """Bring the configured FDSN records into their cache, None if there are none."""
-    return fetch(records.fdsn, records.event, progress) if records and records.fdsn else None
-
-
 def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     """
     Find the stations of all configured sources; the first source that has a station serves it.
@@ -105,7 +99,7 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     records : config.Records
         Tables of columns, folder, SDS archive, ASDF workspace, FDSN services: in this order.
     fetched : Fetched or None
-        From :func:`fetched_records`.
+        Of the FDSN services.
 
     Raises
     ------

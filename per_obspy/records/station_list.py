@@ -18,6 +18,7 @@ import numpy as np
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, Rejection, reason_of, shortened
+from per_obspy.files import reading
 from per_obspy.names import SHOWN, code_problem
 
 #: Most bytes of a list: ten times one of ten thousand stations.
@@ -209,13 +210,13 @@ def _named_station(
 
 def _features(path: Path) -> list[Any]:
     """Return the features of a list."""
-    try:
+    with reading(path):
         if path.stat().st_size > LARGEST_FILE:
             raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
-        # Deep nesting and numbers of endless digits are errors too
-        content = json.loads(path.read_bytes())
-    except OSError as error:
-        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+        read = path.read_bytes()
+    # Deep nesting and numbers of endless digits are errors too
+    try:
+        content = json.loads(read)
     except (ValueError, RecursionError) as error:
         raise CatalogError(str(path), f"a damaged station list: {reason_of(error)}") from error
     features = content.get("features") if isinstance(content, dict) else None

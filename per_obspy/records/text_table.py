@@ -9,7 +9,8 @@ from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Columns
-from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.errors import RecordRejected
+from per_obspy.files import reading
 from per_obspy.formats.text.lines import LONGEST_NUMBER
 from per_obspy.formats.text.vocabulary import (
     channel_direction,
@@ -101,10 +102,8 @@ def _directions(table: Columns) -> dict[str, dict[str, float]]:
 
 def _rows(table: Columns) -> list[_Row]:
     """Return the fields of every line with samples; of packed samples one row per sample."""
-    try:
+    with reading(table.file):
         content = table.file.read_text(encoding="latin-1")
-    except OSError as error:
-        raise CatalogError(str(table.file), f"cannot be read: {error.strerror}") from error
     lines = [line.split("#")[0] for line in content.rstrip().splitlines()]
     # Lines are numbered from 1, the skipped ones included
     numbered = enumerate(lines[table.skip :], table.skip + 1)

@@ -152,10 +152,10 @@ def _fetched_records(settings: Run, progress: Progress) -> "Fetched | None":
     """Bring the configured FDSN records into their cache, None if there are none."""
     if settings.records is None or settings.records.fdsn is None:
         return None
-    from per_obspy.records.sources import fetched_records
+    from per_obspy.records.fdsn.cache import fetch
 
-    fetched = fetched_records(settings.records, progress)
-    for row in fetched.rejected if fetched else ():
+    fetched = fetch(settings.records.fdsn, settings.records.event, progress)
+    for row in fetched.rejected:
         if row.kind == "service":
             log.warning("%s: %s", row.name, "; ".join(row.reasons))
     return fetched

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.config import Watch
-from per_obspy.errors import CatalogError, RecordRejected, ServiceError, reason_of, shortened
-from per_obspy.files import is_part
+from per_obspy.errors import CatalogError, RecordRejected, ServiceError, shortened
+from per_obspy.files import is_part, reading
 from per_obspy.names import public_url
 from per_obspy.records.earthquakes.earthquake import Earthquake
 from per_obspy.records.earthquakes.quakeml import (
@@ -174,10 +174,8 @@ def _folder_feed(folder: Path, seen: Mapping[str, tuple[int, int]]) -> Feed:
 
 def _quakeml_files(folder: Path) -> list[Path]:
     """Return the QuakeML files of a folder, sorted; raise ``CatalogError`` if it cannot be read."""
-    try:
+    with reading(folder):
         paths = sorted(folder.iterdir())
-    except OSError as error:
-        raise CatalogError(str(folder), f"cannot be read: {reason_of(error)}") from error
     return [path for path in paths if path.suffix.lower() in SUFFIXES and not is_part(path)]
 
 

@@ -46,6 +46,7 @@ from per_obspy.watch.revisions import (
 )
 from per_obspy.watch.state import (
     LONGEST_PAUSE,
+    WATCH,
     EventState,
     Task,
     changed,
@@ -55,7 +56,7 @@ from per_obspy.watch.state import (
     moment,
     passed_delays,
     read_watch_state,
-    write_watch_state,
+    write_state,
 )
 
 #: Requests for missing records between two runs, per time since the origin: the later, the rarer.
@@ -87,7 +88,13 @@ def fetched_for(watcher: Watcher, settings: Run) -> Fetched | None:
             fetched = fetch(request, event, watcher.progress, True, pauses, cut=True)
         except ServiceError:
             fetched = _fetched_before(request, event, watcher.progress, pauses)
-    return _without_restored(fetched)
+    # Stations whose earlier records were kept are not rejected
+    missing = tuple(
+        row
+        for row in fetched.rejected
+        if row.source != FDSN or not (fetched.folder / f"{row.name}{RECORDS}").is_file()
+    )
+    return fetched._replace(rejected=missing)
 
 
 def _fetched_before(
@@ -100,16 +107,6 @@ def _fetched_before(
         if pauses:
             raise PassingFault(str(error), min(pauses.values())) from error
         raise
-
-
-def _without_restored(fetched: Fetched) -> Fetched:
-    """Return records without the rejections of stations whose earlier records were kept."""
-    missing = tuple(
-        row
-        for row in fetched.rejected
-        if row.source != FDSN or not (fetched.folder / f"{row.name}{RECORDS}").is_file()
-    )
-    return fetched._replace(rejected=missing)
 
 
 @contextmanager
@@ -129,7 +126,7 @@ def _pauses(folder: Path, now: datetime) -> Iterator[dict[str, float]]:
                 for host, rest in pauses.items()
             }
             state = read_watch_state(folder).model_copy(update={"resting": until})
-            write_watch_state(folder, state)
+            write_state(folder / WATCH, state)
 
 
 def records_hash(fetched: Fetched | None) -> str:

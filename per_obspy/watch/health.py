@@ -17,7 +17,6 @@ from pydantic import Field
 
 from per_obspy.config.section import Moment
 from per_obspy.errors import CatalogError
-from per_obspy.files import write_json
 from per_obspy.resume import Comparison, Status, StatusError, compare_outputs
 from per_obspy.resume import read_status as read_record
 from per_obspy.watch.state import State, moment, read_state
@@ -51,19 +50,6 @@ class WatchStatus(State):
     host: str = Field(default_factory=platform.node)
     #: Of per_obspy.
     version: str = Field(default_factory=lambda: version("per_obspy"))
-
-
-def write_status(folder: Path, status: WatchStatus) -> Path:
-    """
-    Write the status of a watched folder, whole or not at all, and return its file.
-
-    Raises
-    ------
-    WriteError
-        If the machine cannot write.
-    """
-    write_json(folder / STATUS, status.model_dump(mode="json"))
-    return folder / STATUS
 
 
 def read_status(folder: Path) -> WatchStatus:

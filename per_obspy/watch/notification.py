@@ -65,7 +65,8 @@ def notify(settings: Notify, message: Message) -> tuple[str, ...]:
     """
     if message.kind not in settings.on:
         return ()
-    body = _body(message)
+    report = [f"Report: {message.report}"] if message.report else []
+    body = "\n\n".join([message.text.strip()[:LONGEST_TEXT], *report]) + "\n"
     # Every way is tried, whatever became of the others
     reasons = []
     for deliver in (_by_command, _by_apprise):
@@ -82,13 +83,6 @@ def notify(settings: Notify, message: Message) -> tuple[str, ...]:
 
 class _Undelivered(PerError):
     """Failure to deliver a message."""
-
-
-def _body(message: Message) -> str:
-    """Return the text of a message with the path of its report."""
-    text = message.text.strip()[:LONGEST_TEXT]
-    report = [f"Report: {message.report}"] if message.report else []
-    return "\n\n".join([text, *report]) + "\n"
 
 
 def _by_command(settings: Notify, message: Message, body: str) -> None:

@@ -15,6 +15,8 @@ from per_obspy.watch.event_feed import Feed, present_event, read_feed
 from per_obspy.watch.event_settings import Watcher
 from per_obspy.watch.relevance import circle_around, distances, matters
 from per_obspy.watch.state import (
+    EVENT,
+    WATCH,
     EventState,
     WatchState,
     after_pause,
@@ -25,8 +27,7 @@ from per_obspy.watch.state import (
     moment,
     noted_faults,
     read_watch_state,
-    write_event_state,
-    write_watch_state,
+    write_state,
 )
 
 log = logging.getLogger(__name__)
@@ -63,7 +64,6 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
         errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
         return state
     # Runs that are due do not wait for the list
-    update: dict[str, object]
     faults = list[PerError]()
     reach = max(reach.distance for reach in watcher.watch.magnitudes)
     with noted_faults(faults):
@@ -78,7 +78,7 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
         update = {"last_poll": iso(now), "since": iso(now), "seen": feed.seen, "ignored": ignored}
         update |= {"failures": 0, "not_before": None, "last_error": None}
     state = state.model_copy(update=update)
-    write_watch_state(watcher.folder, state)
+    write_state(watcher.folder / WATCH, state)
     return state
 
 
@@ -116,7 +116,7 @@ def _problems(watch: Watch, feed: Feed) -> list[PerError]:
 
 def keep(watcher: Watcher, states: dict[str, EventState], state: EventState) -> None:
     """Write the state of an earthquake, and remember it."""
-    write_event_state(event_folder(watcher.folder, state.event_id), state)
+    write_state(event_folder(watcher.folder, state.event_id) / EVENT, state)
     before = states.get(state.event_id)
     if state.state == "closed" and (before is None or before.state != "closed"):
         log.info("%s: closed: %s", shortened(state.event_id, 80), state.reason)

@@ -11,7 +11,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Reach, Run, TableForm
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError
-from per_obspy.files import read_json, write_json
+from per_obspy.files import read_json, reading, write_json
 from per_obspy.inventory.catalogue import Box, stored_inventories
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk
 from per_obspy.screening.motion_field import great_circle
@@ -89,10 +89,8 @@ def inventory_places(settings: Run, folder: Path) -> Places:
 def _kept_places(file: Path, settings: Run, folder: Path) -> Places:
     """Return the places of a pair table, from the watched folder if the table has not changed."""
     assert settings.pairs is not None
-    try:
+    with reading(file):
         facts = file.stat()
-    except OSError as error:
-        raise CatalogError(str(file), f"cannot be read: {error.strerror}") from error
     # The table is read again if it has changed
     form = settings.pairs.form
     key = [str(file), facts.st_size, facts.st_mtime_ns, form.model_dump_json()]

@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
-from per_obspy.config.section import Moment, Section
+from per_obspy.config.section import Latitude, Longitude, Moment, Section
 from per_obspy.errors import CatalogError, MachineFault, PerError, TryLater, reason_of, shortened
 from per_obspy.files import write_json
 from per_obspy.machine import machine_fault
@@ -60,8 +60,8 @@ class EventState(State):
     #: Origin time, ISO 8601, UTC.
     time: Moment
     #: Of the epicentre, degrees.
-    latitude: float = Field(ge=-90, le=90)
-    longitude: float = Field(ge=-180, le=180)
+    latitude: Latitude
+    longitude: Longitude
     #: m.
     depth: float | None = None
     magnitude: float | None = None
@@ -166,14 +166,9 @@ def event_folder(folder: Path, event_id: str) -> Path:
     return inside(folder / "events", file_name(event_id))
 
 
-def write_event_state(folder: Path, state: EventState) -> None:
-    """Write the state of an earthquake, whole or not at all, into its folder."""
-    write_json(folder / EVENT, state.model_dump(mode="json"))
-
-
-def write_watch_state(folder: Path, state: WatchState) -> None:
-    """Write the state of a watched folder, whole or not at all."""
-    write_json(folder / WATCH, state.model_dump(mode="json"))
+def write_state(file: Path, state: State) -> None:
+    """Write a state, whole or not at all."""
+    write_json(file, state.model_dump(mode="json"))
 
 
 def read_watch_state(folder: Path) -> WatchState:

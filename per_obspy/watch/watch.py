@@ -22,7 +22,7 @@ from per_obspy.progress import Progress, silent
 from per_obspy.runs.output_folder import RECORD, Result, locked_folder
 from per_obspy.watch.event_run import arrivals_of, done_task, is_look_due, looked
 from per_obspy.watch.event_settings import Watcher
-from per_obspy.watch.health import WatchStatus, write_status
+from per_obspy.watch.health import STATUS, WatchStatus
 from per_obspy.watch.notified_run import notify_failure, notify_result, undelivered
 from per_obspy.watch.polling import confirm, is_over, keep, polled
 from per_obspy.watch.relevance import inventory_places
@@ -43,6 +43,7 @@ from per_obspy.watch.state import (
     noted_faults,
     pause,
     read_event_states,
+    write_state,
 )
 
 log = logging.getLogger(__name__)
@@ -332,7 +333,7 @@ def _ended(
         ignored=ignored_lines(state),
         running=running,
     )
-    write_status(watcher.folder, status)
+    write_state(watcher.folder / STATUS, status)
     return Pass(tuple(errors), count, following)
 
 

@@ -20,11 +20,16 @@ from station_files import record
 from per_obspy.errors import RecordRejected
 from per_obspy.reader_process import Limits
 from per_obspy.records import obspy_readers
+from per_obspy.records.archive import read_file
 from per_obspy.records.earthquakes.quakeml import read_event
 from per_obspy.records.folder import find_stations
 from per_obspy.records.metadata import read_inventories
-from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy
+from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_content
 from per_obspy.records.summary import describe_records
+
+
+def _read(path: Path) -> obspy.Stream:
+    return read_content(obspy.read, read_file(path), path)
 
 
 class Payload:
@@ -95,7 +100,7 @@ def test_no_file_runs_code(tmp_path: Path, packer: Callable[[bytes], bytes], nam
         lambda: describe_records(path),
         lambda: read_event(path),
         lambda: read_inventories(path),
-        lambda: read_with_obspy(obspy.read, path),
+        lambda: _read(path),
         lambda: read_bytes_with_obspy(obspy.read, path.read_bytes(), "service"),
         lambda: read_bytes_with_obspy(obspy.read, path.read_bytes(), "service", format="PICKLE"),
     ]
@@ -137,7 +142,7 @@ def test_a_record_names_no_file_elsewhere(tmp_path: Path):
     folder.mkdir()
     (folder / "a.wfdisc").write_bytes(bytes(row) + b"\n")
     with pytest.raises(RecordRejected, match="its format is unknown"):
-        read_with_obspy(obspy.read, folder / "a.wfdisc")
+        _read(folder / "a.wfdisc")
 
 
 @pytest.mark.parametrize("packer", [gzip.compress, bz2.compress], ids=["gz", "bz2"])
@@ -146,15 +151,15 @@ def test_packed_files_are_read_up_to_a_limit(tmp_path: Path, packer, monkeypatch
     record("HN1").write(content, format="MSEED")
     path = tmp_path / "record.mseed"
     path.write_bytes(packer(content.getvalue()))
-    (trace,) = read_with_obspy(obspy.read, path)
+    (trace,) = _read(path)
     assert trace.stats.channel == "HN1"
     # the same file with a limit of one byte less; then cut
     monkeypatch.setattr(obspy_readers, "LARGEST_UNPACKED", len(content.getvalue()) - 1)
     with pytest.raises(RecordRejected, match="it unpacks to more than 0 MiB"):
-        read_with_obspy(obspy.read, path)
+        _read(path)
     path.write_bytes(path.read_bytes()[:-12])
     with pytest.raises(RecordRejected, match="the packed file is damaged"):
-        read_with_obspy(obspy.read, path)
+        _read(path)
 
 
 @pytest.mark.parametrize("packer", [gzip.compress, bz2.compress], ids=["gz", "bz2"])
@@ -164,7 +169,7 @@ def test_a_bomb_is_refused_before_it_fills_the_memory(tmp_path: Path, packer):
     path.write_bytes(packer(bytes(256 << 20)))
     tracemalloc.start()
     with pytest.raises(RecordRejected, match="more than 200 times its packed size"):
-        read_with_obspy(obspy.read, path)
+        _read(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     # What is unpacked, and its buffer as it grows by an eighth
@@ -177,18 +182,18 @@ def test_a_bomb_is_refused_before_it_fills_the_memory(tmp_path: Path, packer):
 def test_other_packers_are_named(tmp_path: Path, content, packer):
     (tmp_path / "record.mseed").write_bytes(content)
     with pytest.raises(RecordRejected, match=f"it is packed by {packer}: unpack it first"):
-        read_with_obspy(obspy.read, tmp_path / "record.mseed")
+        _read(tmp_path / "record.mseed")
 
 
 def test_archives_under_other_names_are_named(tmp_path: Path):
     (tmp_path / "record").write_bytes(zipped(b"words"))
     with pytest.raises(RecordRejected, match=r"it is an archive: its name must end with \.zip"):
-        read_with_obspy(obspy.read, tmp_path / "record")
+        _read(tmp_path / "record")
 
 
 def test_samples_in_a_file_beside_are_found(tmp_path: Path):
     record("HNZ").write(str(tmp_path / "record"), format="Q")
-    (trace,) = read_with_obspy(obspy.read, tmp_path / "record.QHD")
+    (trace,) = _read(tmp_path / "record.QHD")
     assert trace.stats.npts == record("HNZ").stats.npts
 
 
@@ -196,7 +201,7 @@ def test_names_with_wildcards_mean_themselves(tmp_path: Path):
     # would catch obspy.read's own reading of wildcards
     record("HN1").write(str(tmp_path / "[H*]?.mseed"), format="MSEED")
     record("HN2").write(str(tmp_path / "HN2.mseed"), format="MSEED")
-    (trace,) = read_with_obspy(obspy.read, tmp_path / "[H*]?.mseed")
+    (trace,) = _read(tmp_path / "[H*]?.mseed")
     assert trace.stats.channel == "HN1"
 
 
@@ -292,11 +297,11 @@ def test_a_file_that_hung_is_a_row_of_the_rejected(tmp_path: Path, real_data: Pa
 def test_plain_numbers_are_sent_to_their_configuration(tmp_path: Path, head: str, row: str):
     (tmp_path / "REHS.090").write_text(head + 400 * row)
     with pytest.raises(RecordRejected, match=r"\[\[records.columns\]\]"):
-        read_with_obspy(obspy.read, tmp_path / "REHS.090")
+        _read(tmp_path / "REHS.090")
 
 
 def test_a_file_and_its_bytes_are_read_alike(tmp_path: Path):
     path = tmp_path / "record.mseed"
     record("HN1").write(str(path), format="MSEED")
     (trace,) = read_bytes_with_obspy(obspy.read, path.read_bytes(), "service", format="MSEED")
-    assert trace == read_with_obspy(obspy.read, path)[0]
+    assert trace == _read(path)[0]

@@ -9,8 +9,8 @@ from test_shakemap import FIELDS, grid_xml, make_rows
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
-from per_obspy.records.fdsn.cache import known_shakemap
-from per_obspy.records.sources import fetched_records, find_sources
+from per_obspy.records.fdsn.cache import fetch, known_shakemap
+from per_obspy.records.sources import find_sources
 from per_obspy.runs.fetch import fetch_configured, fetch_event
 from per_obspy.simulation.earthquake import simulate
 
@@ -81,7 +81,7 @@ def test_a_named_earthquake_is_fetched_whole_and_once(server, tmp_path):
     # A run with this section needs no network
     asked = len(server.requests)
     server.shutdown()
-    sources = find_sources(found.records, fetched_records(found.records))
+    sources = find_sources(found.records, fetch(found.records.fdsn, found.records.event))
     assert list(sources.stations) == found.stations
     assert sources.event.path == found.event
     assert len(server.requests) == asked

@@ -1,7 +1,7 @@
 """
 Every kind of screening has its summary, overview, layers and workbook, and its pairs are shown.
 
-Tests of per_obspy.runs.report and of per_obspy.cli.show, through the commands.
+Tests of per_obspy.runs.report and of per_obspy.cli.results, through the commands.
 """
 
 import csv

@@ -13,7 +13,8 @@ from per_obspy.files import file_hash
 from per_obspy.resume import write_status as write_record
 from per_obspy.runs.output_folder import file_hashes
 from per_obspy.watch import health
-from per_obspy.watch.health import WatchStatus, folder_health, write_status
+from per_obspy.watch.health import STATUS, WatchStatus, folder_health
+from per_obspy.watch.state import write_state
 
 DUE = "2099-01-01T00:00:00+00:00"
 PAST = "2001-01-01T00:00:00+00:00"
@@ -43,7 +44,7 @@ def dead_process():
     ],
 )
 def test_a_watcher_has_an_exit_code_for_monitoring(tmp_path, call, facts, state, code):
-    write_status(tmp_path, WatchStatus(**facts))
+    write_state(tmp_path / STATUS, WatchStatus(**facts))
     found, out, err = call("status", tmp_path, "--json")
     assert (found, err) == (code, "")
     assert json.loads(out)["state"] == state
@@ -53,12 +54,14 @@ def test_a_watcher_has_an_exit_code_for_monitoring(tmp_path, call, facts, state,
 def test_a_watcher_whose_process_is_gone_has_stopped(tmp_path):
     # between two runs of a timer there is no process
     pid = dead_process()
-    write_status(tmp_path, WatchStatus(next_due=DUE, pid=pid, running=True))
+    write_state(tmp_path / STATUS, WatchStatus(next_due=DUE, pid=pid, running=True))
     assert folder_health(tmp_path).state == "stopped"
-    write_status(tmp_path, WatchStatus(next_due=DUE, pid=pid, running=False))
+    write_state(tmp_path / STATUS, WatchStatus(next_due=DUE, pid=pid, running=False))
     assert folder_health(tmp_path).state == "fine"
     # the number says nothing on another machine
-    write_status(tmp_path, WatchStatus(next_due=DUE, pid=pid, running=True, host="elsewhere"))
+    write_state(
+        tmp_path / STATUS, WatchStatus(next_due=DUE, pid=pid, running=True, host="elsewhere")
+    )
     assert folder_health(tmp_path).state == "fine"
 
 
@@ -133,7 +136,7 @@ def test_a_damaged_result_is_not_fine(tmp_path: Path, call, name: str, damage):
 
 
 def test_the_newest_results_of_a_watcher_are_compared(tmp_path: Path, call):
-    write_status(tmp_path, WatchStatus(next_due=DUE))
+    write_state(tmp_path / STATUS, WatchStatus(next_due=DUE))
     revision = write_run(tmp_path / "events" / "x1" / "revisions" / "0001")
     (revision / "run.json").rename(revision / "revision.json")
     (tmp_path / "events" / "x1" / "latest").symlink_to("revisions/0001")

@@ -5,13 +5,14 @@ import json
 import pytest
 
 from per_obspy.watch.state import (
+    EVENT,
+    WATCH,
     EventState,
     WatchState,
     event_folder,
     read_event_states,
     read_watch_state,
-    write_event_state,
-    write_watch_state,
+    write_state,
 )
 
 STATE = EventState(
@@ -27,10 +28,10 @@ STATE = EventState(
 
 
 def test_what_is_written_is_read(tmp_path):
-    write_event_state(event_folder(tmp_path, STATE.event_id), STATE)
+    write_state(event_folder(tmp_path, STATE.event_id) / EVENT, STATE)
     assert read_event_states(tmp_path) == ({"us7000abcd": STATE}, [])
     state = WatchState(last_poll="2026-11-23T01:00:00+00:00", seen={"a.xml": (3, 10**18)})
-    write_watch_state(tmp_path, state)
+    write_state(tmp_path / WATCH, state)
     assert read_watch_state(tmp_path) == state
 
 
@@ -48,8 +49,8 @@ def test_identifiers_that_differ_have_folders_that_differ(tmp_path):
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"event_id": "x"', "\x00\xff", "null"])
 def test_a_damaged_state_is_one_line_and_costs_no_other(tmp_path, text):
-    write_event_state(event_folder(tmp_path, STATE.event_id), STATE)
-    write_event_state(event_folder(tmp_path, "b"), STATE.model_copy(update={"event_id": "b"}))
+    write_state(event_folder(tmp_path, STATE.event_id) / EVENT, STATE)
+    write_state(event_folder(tmp_path, "b") / EVENT, STATE.model_copy(update={"event_id": "b"}))
     (tmp_path / "events" / "b" / "event.json").write_text(text, encoding="utf-8")
     states, (problem,) = read_event_states(tmp_path)
     assert list(states) == ["us7000abcd"]
@@ -63,7 +64,7 @@ def test_a_damaged_state_of_the_folder_asks_for_everything_again(tmp_path):
 
 
 def test_numbers_that_are_none_are_refused(tmp_path):
-    write_event_state(event_folder(tmp_path, "a"), STATE)
+    write_state(event_folder(tmp_path, "a") / EVENT, STATE)
     file = tmp_path / "events" / "a" / "event.json"
     content = json.loads(file.read_text()) | {"latitude": 1e400}
     file.write_text(json.dumps(content))

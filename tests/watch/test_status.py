@@ -6,13 +6,15 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import is_part
-from per_obspy.watch.health import WatchStatus, read_status, write_status
+from per_obspy.watch.health import STATUS, WatchStatus, read_status
+from per_obspy.watch.state import write_state
 
 
 def test_what_was_written_is_read(tmp_path):
     status = WatchStatus(last_poll="2026-01-02T03:04:05+00:00", events_open=2, running=True)
     assert status.pid == os.getpid()
-    file = write_status(tmp_path, status)
+    file = tmp_path / STATUS
+    write_state(file, status)
     assert read_status(tmp_path) == status
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
     assert not is_part(file)

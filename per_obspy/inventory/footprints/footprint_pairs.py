@@ -5,7 +5,6 @@ Rows of the table are made and checked block by block, to bound memory. Building
 file that goes with the pairs, which refer to it by ``building_id_1`` and ``building_id_2``.
 """
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -30,7 +29,7 @@ from per_obspy.inventory.footprints.layer_files import Box
 from per_obspy.inventory.footprints.layers import BLOCK, blocks, polygons, read_layer, transformed
 from per_obspy.inventory.footprints.neighbours import IntArray, Outlines, neighbours
 from per_obspy.inventory.footprints.raster_heights import raster_heights
-from per_obspy.inventory.footprints.raw_layer import Geometries
+from per_obspy.inventory.footprints.raw_layer import GEOMETRY, Geometries, geo_metadata
 from per_obspy.inventory.footprints.sources import LEARNED, ORIGINS, OUTLINE_SOURCE, source_of
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
@@ -51,12 +50,6 @@ _PLACE = ["longitude", "latitude", "area"]
 
 #: A local projection is true to scale within this range of longitudes, degrees.
 WIDEST_LAYER = 6.0
-
-#: Version of GeoParquet that is written: https://geoparquet.org/releases/v1.1.0/.
-GEOPARQUET = "1.1.0"
-
-#: Column of the outlines.
-GEOMETRY = "geometry"
 
 
 class Buildings(NamedTuple):
@@ -450,10 +443,7 @@ def write_buildings(buildings: Buildings, path: Path) -> None:
     """
     table = pa.Table.from_pandas(buildings.table, preserve_index=False)
     outlines = buildings.outlines.cast(pa.binary())
-    # Without a reference system GeoParquet means degrees, WGS 84
-    column = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"]}
-    geo = {"version": GEOPARQUET, "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
     table = table.append_column(GEOMETRY, outlines)
     with written_whole(path) as part:
-        described = table.replace_schema_metadata({"geo": json.dumps(geo)})
+        described = table.replace_schema_metadata(geo_metadata(["Polygon", "MultiPolygon"]))
         pa.parquet.write_table(described, part, row_group_size=5 * BLOCK)

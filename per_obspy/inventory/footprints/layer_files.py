@@ -25,7 +25,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet
 
 from per_obspy.errors import CatalogError, TryLater, shortened
-from per_obspy.files import scratch_folder, unreadable_reason, writing
+from per_obspy.files import reading, scratch_folder, unreadable_reason, writing
 from per_obspy.inventory.files.parquet import plain_columns
 from per_obspy.inventory.footprints.citygml import read_citygml
 from per_obspy.inventory.footprints.csv_buildings import read_csv_buildings
@@ -166,28 +166,23 @@ def _wrong_beginning(file: Path) -> str:
 def _read(file: Path, layer: str | None, box: Box | None, around: Box | None) -> RawLayer:
     """Read a layer in the process of readers; messages name the file that may be packed."""
     source = str(file)
-    try:
-        with _unpacked(file) as plain:
-            suffix = plain.suffix.lower()
-            with plain.open("rb") as opened:
-                head = opened.read(1 << 16)
-            # Microsoft names lines of GeoJSON .csv
-            is_json = head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
-            if suffix in LINES or (suffix == ".csv" and is_json):
-                return read_geojson_lines(plain, source)
-            # Its words tell assets from other JSON
-            if suffix in JSON_SUFFIXES and is_asset_json(head):
-                return read_asset_json(plain, source)
-            if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
-                return _read_gdal(plain, layer, around)
-            readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
-            if suffix in readers:
-                return readers[suffix](plain, source)
-            return _read_geoparquet(plain, source, box)
-    except TryLater:
-        raise
-    except OSError as error:
-        raise CatalogError(source, f"cannot be read: {error.strerror or error}") from error
+    with reading(file), _unpacked(file) as plain:
+        suffix = plain.suffix.lower()
+        with plain.open("rb") as opened:
+            head = opened.read(1 << 16)
+        # Microsoft names lines of GeoJSON .csv
+        is_json = head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
+        if suffix in LINES or (suffix == ".csv" and is_json):
+            return read_geojson_lines(plain, source)
+        # Its words tell assets from other JSON
+        if suffix in JSON_SUFFIXES and is_asset_json(head):
+            return read_asset_json(plain, source)
+        if suffix in GDAL_KINDS or suffix in (".pbf", ".osm"):
+            return _read_gdal(plain, layer, around)
+        readers = {".csv": read_csv_buildings, ".gml": read_citygml, ".xml": read_citygml}
+        if suffix in readers:
+            return readers[suffix](plain, source)
+        return _read_geoparquet(plain, source, box)
 
 
 @contextmanager

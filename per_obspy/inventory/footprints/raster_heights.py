@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError
-from per_obspy.files import unreadable_reason
+from per_obspy.files import reading, unreadable_reason
 from per_obspy.inventory.footprints.layers import BLOCK, polygons, to_degrees
 from per_obspy.inventory.footprints.raw_layer import Geometries
 from per_obspy.reader_process import BeyondLimits, Limits, read_apart
@@ -79,11 +79,8 @@ def raster_heights(file: Path, outlines: pa.Array) -> FloatArray:
 
 def _require_tiff(file: Path) -> None:
     """Raise CatalogError if a file is missing or does not begin as TIFF."""
-    try:
-        with file.open("rb") as opened:
-            head = opened.read(4)
-    except OSError as error:
-        raise CatalogError(str(file), f"cannot be read: {error.strerror or error}") from error
+    with reading(file), file.open("rb") as opened:
+        head = opened.read(4)
     if head not in _BEGINNINGS:
         raise CatalogError(str(file), "is no GeoTIFF by its first bytes")
 

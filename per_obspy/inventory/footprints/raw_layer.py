@@ -1,5 +1,6 @@
 """A layer of buildings as its file has it, unchecked, and columns from the cells of buildings."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from per_obspy.errors import Rejection
 
 Geometries = NDArray[np.object_]
+
+#: Column of the outlines in GeoParquet.
+GEOMETRY = "geometry"
 
 #: Most columns of a file without a header: further names are left out.
 MOST_NAMES = 200
@@ -45,6 +49,18 @@ def features(
 def as_wkb(shapes: Geometries) -> pa.Array:
     """Return geometries as WKB, null where there is none."""
     return pa.array(shapely.to_wkb(shapes), pa.large_binary())
+
+
+def geo_metadata(types: Sequence[str]) -> dict[str, str]:
+    """
+    Return what GeoParquet 1.1 has to say of its column of WKB with geometries of some types.
+
+    Without a reference system coordinates are longitude and latitude, WGS 84; no types mean that
+    they are unknown (https://geoparquet.org/releases/v1.1.0/).
+    """
+    column = {"encoding": "WKB", "geometry_types": types}
+    geo = {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+    return {"geo": json.dumps(geo)}
 
 
 def cell_table(rows: Iterable[Mapping[str, object]]) -> pa.Table:

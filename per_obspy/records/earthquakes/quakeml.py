@@ -8,8 +8,8 @@ import obspy
 from obspy import UTCDateTime
 from obspy.core.event import Catalog, Event, Magnitude, Origin, ResourceIdentifier
 
-from per_obspy.errors import CatalogError, RecordRejected, reason_of, shortened
-from per_obspy.files import bytes_hash, file_hash
+from per_obspy.errors import CatalogError, RecordRejected, shortened
+from per_obspy.files import bytes_hash, file_hash, reading
 from per_obspy.names import LONGEST_CODE, code_problem
 from per_obspy.records.archive import open_file
 from per_obspy.records.asdf import ASDF_MARK, read_asdf_events
@@ -56,16 +56,17 @@ def read_event_file(path: Path) -> EventFile:
     """Read the one event of a file with the file's hash; parameters and errors of `read_event`."""
     # A workspace, which may be large, is never in memory as a whole
     try:
-        with open_file(path) as file:
-            head = file.read(len(ASDF_MARK))
-            content = b"" if head == ASDF_MARK else head + file.read()
-        if head == ASDF_MARK:
-            return EventFile(path, file_hash(path), _only_event(read_asdf_events(path), str(path)))
-        events = read_content(obspy.read_events, content, path)
+        with reading(path):
+            with open_file(path) as file:
+                head = file.read(len(ASDF_MARK))
+                content = b"" if head == ASDF_MARK else head + file.read()
+            if head == ASDF_MARK:
+                return EventFile(
+                    path, file_hash(path), _only_event(read_asdf_events(path), str(path))
+                )
+            events = read_content(obspy.read_events, content, path)
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
-    except OSError as error:
-        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     return EventFile(path, bytes_hash(content), _only_event(events, str(path)))
 
 
@@ -167,13 +168,12 @@ def read_quakeml(path: Path) -> tuple[dict[str, Event], list[str]]:
     """
     # ObsPy needs many times the size of a file in memory
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise CatalogError(str(path), f"is larger than {LARGEST_FILE} bytes")
-        catalog = events_of(path.read_bytes(), str(path))
+        with reading(path):
+            if path.stat().st_size > LARGEST_FILE:
+                raise CatalogError(str(path), f"is larger than {LARGEST_FILE} bytes")
+            catalog = events_of(path.read_bytes(), str(path))
     except RecordRejected as error:
         raise CatalogError(str(path), f"is no QuakeML: {'; '.join(error.reasons)}") from error
-    except OSError as error:
-        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     # One earthquake without a place costs no other
     events, problems = {}, []
     for event in catalog:

@@ -29,7 +29,7 @@ from per_obspy.records.earthquakes.quakeml import earthquake_of, file_name, iso_
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, WebPool, answer
-from per_obspy.records.obspy_readers import read_with_obspy
+from per_obspy.records.obspy_readers import read_content
 from per_obspy.resume import earlier_status, write_status
 
 log = logging.getLogger(__name__)
@@ -333,7 +333,7 @@ def _file_rows(path: Path) -> Listed:
     content = path.read_bytes()
     if content.lstrip()[:1] == b"{":
         return _feed_rows(content)
-    events = read_with_obspy(obspy.read_events, path)
+    events = read_content(obspy.read_events, content, path)
     return _each(earthquake_of, events, lambda event: str(event.resource_id))
 
 

@@ -1,6 +1,5 @@
 """Layers of a GeoPackage, and GeoParquet with the same pairs."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import printable
+from per_obspy.inventory.footprints import raw_layer
 from per_obspy.report.layers.kml import BOTH_PLACES, has_both_places
 
 Shapes = NDArray[np.object_]
@@ -45,10 +45,6 @@ def points(table: pd.DataFrame) -> Shapes:
     return shapes
 
 
-#: Version of the specification (https://geoparquet.org/releases/v1.1.0), and name of the shapes.
-VERSION, PARQUET_GEOMETRY = "1.1.0", "geometry"
-
-
 class GeoParquet:
     """
     GeoParquet file to which rows are appended in pieces.
@@ -65,18 +61,10 @@ class GeoParquet:
 
     def append(self, table: pd.DataFrame, shapes: Shapes) -> None:
         """Append rows; those of the first piece decide the types of all columns."""
-        rows = with_shapes(table, shapes, PARQUET_GEOMETRY)
+        rows = with_shapes(table, shapes, raw_layer.GEOMETRY)
         if self._writer is None:
-            # Without a reference system coordinates are longitude and latitude, WGS 84
-            # No types mean that they are unknown
             kinds = [geometry_type(shapes)] if shapely.is_geometry(shapes).any() else []
-            column = {"encoding": "WKB", "geometry_types": kinds}
-            geo = {
-                "version": VERSION,
-                "primary_column": PARQUET_GEOMETRY,
-                "columns": {PARQUET_GEOMETRY: column},
-            }
-            schema = rows.schema.with_metadata({"geo": json.dumps(geo)})
+            schema = rows.schema.with_metadata(raw_layer.geo_metadata(kinds))
             self._writer = pq.ParquetWriter(self.path, schema)
         self._writer.write_table(rows.cast(self._writer.schema))
 
@@ -225,12 +213,11 @@ def write_styles(path: Path, styles: Mapping[str, str]) -> None:
     }
     # One row per layer
     columns: dict[str, NDArray[Any]] = {
-        name: np.array([text] * len(styles) if isinstance(text, str) else text, dtype=object)
-        for name, text in texts.items()
+        name: np.full(len(styles), text, dtype=object) for name, text in texts.items()
     }
     columns["useAsDefault"] = np.ones(len(styles), dtype=bool)
     now = datetime.now(UTC).replace(tzinfo=None)
-    columns["update_time"] = np.array([now] * len(styles), dtype="datetime64[ms]")
+    columns["update_time"] = np.full(len(styles), now, dtype="datetime64[ms]")
     # A table without geometry
     pyogrio.raw.write(
         path,

@@ -238,14 +238,10 @@ def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
         return None
     # What is missing is empty
     columns = [pairs[name].astype(object).where(pairs[name].notna(), "") for name in names]
-    joined = [_joined(row) for row in zip(*columns, strict=True)]
+    # Each name once, in their order
+    texts = (map(str.strip, map(str, row)) for row in zip(*columns, strict=True))
+    joined = [", ".join(filter(None, dict.fromkeys(row))) for row in texts]
     return pd.Series(joined, index=pairs.index, dtype=str)
-
-
-def _joined(names: Iterable[object]) -> str:
-    """Join names in their order, without repetition."""
-    texts = dict.fromkeys(str(name).strip() for name in names)
-    return ", ".join(text for text in texts if text)
 
 
 def address_columns(names: Iterable[Any]) -> list[Any]:
