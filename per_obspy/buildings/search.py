@@ -78,7 +78,7 @@ OF_CHUNKS = (
 SHARED = ("station", "state", "derived", "flags")
 
 #: Pairs of a piece, and contacts of a chunk, of which a worker needs 1 kB for each; about.
-PIECE, CHUNK = 20_000, 10_000
+PIECE, CHUNK = 50_000, 10_000
 
 #: Rows of a table, and sorted identifiers, that are read together.
 BATCH, SORTED = 20_000, 100_000

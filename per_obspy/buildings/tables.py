@@ -264,6 +264,7 @@ def _areas(table: pa.Table, pairs: pa.Table, totals: Totals) -> pa.Array:
 def _ranked(tables: Iterable[pa.Table], schema: pa.Schema) -> Iterator[pa.Table]:
     """Yield buildings with their rank from 1, without the numbers by which they were made."""
     unnumbered, before = schema.remove(0), 0
+    # What only their order needs is left out
     known = (table.select(unnumbered.names) for table in tables)
     for rows in regrouped(known, unnumbered, RANKED):
         rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))

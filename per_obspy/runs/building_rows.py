@@ -13,6 +13,7 @@ from per_obspy.buildings.search import (
     IDENTIFIERS,
     WITHOUT_HISTORIES,
     AllRows,
+    PieceRows,
     chunks_of,
     connected_pieces,
     find_rows,
@@ -28,14 +29,13 @@ from per_obspy.buildings.tables import (
     write_buildings,
     write_rows,
 )
-from per_obspy.config import Run
 from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder
 from per_obspy.results.parts import joined_rows, joined_schema
 from per_obspy.results.ranked_table import RankedTable, ranked_table, table_files
 from per_obspy.results.totals import PLACE
 from per_obspy.runs.provenance import RunContext
-from per_obspy.runs.tasks.building_piece import PIECES, piece_task
+from per_obspy.runs.tasks.building_piece import PIECES, PieceTask, piece_task
 from per_obspy.runs.tasks.building_rows import RowsTask
 from per_obspy.runs.tasks.ground_files import GroundFiles
 from per_obspy.runs.tasks.parallel import Workers, finish, results
@@ -78,20 +78,33 @@ def building_rows(
     """
     settings, folder = context.settings, context.folder
     with ranked_table(table_files(folder)) as pairs, temporary_folder(folder) as room:
-        # By default if pairs name their buildings
+        # By default if pairs name their buildings, and as pairs are followed
         are_named = set(IDENTIFIERS) <= set(pairs.schema.names)
         if not (are_named if settings.rows.enabled is None else settings.rows.enabled):
             return NO_ROWS
-        if not _has_histories(settings):
+        exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
+        if not exact:
             return _without_histories(context, pairs, room, facts)
-        found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
-        parts = _parts(_tasks(folder, ground, found), context.workers, found.contacts)
-        # Parts of an earlier table would be taken for parts of this one
-        remove_other_parts(folder / "rows", parts)
-        files = [part.path for part in parts if part.path]
-        outputs = write_rows(rows_of_parts(files), folder, facts)
-        buildings = buildings_of(folder, found.file, settings)
-        outputs += write_buildings(buildings, folder, settings, facts)
+        return _with_histories(context, pairs, room, ground, facts)
+
+
+def _with_histories(
+    context: RunContext,
+    pairs: RankedTable,
+    room: Path,
+    ground: GroundFiles,
+    facts: Mapping[str, str],
+) -> BuildingRowsDone:
+    """Write both tables from chunks of rows, which are followed."""
+    settings, folder = context.settings, context.folder
+    found = find_rows(pairs, settings.rows, settings.totals.area or PLACE, room)
+    parts = _parts(_tasks(folder, ground, found), context.workers, found.contacts)
+    # Parts of an earlier table would be taken for parts of this one
+    remove_other_parts(folder / "rows", parts)
+    files = [part.path for part in parts if part.path]
+    outputs = write_rows(rows_of_parts(files), folder, facts)
+    outputs += write_buildings(buildings_of(folder, found.file, settings), folder, settings, facts)
+    # And what is found besides
     rejected = (*found.rejected, *rejections(parts))
     failed = any(part.failed for part in parts)
     counts = _counts(found.rows, folder, parts)
@@ -102,13 +115,9 @@ def _without_histories(
     context: RunContext, pairs: RankedTable, room: Path, facts: Mapping[str, str]
 ) -> BuildingRowsDone:
     """Write both tables from parts of pieces of connected pairs, each in its order."""
-    settings, folder, workers = context.settings, context.folder, context.workers
-    with one_thread_database(room) as database:
-        area = settings.totals.area or PLACE
-        named, pieces = connected_pieces(pairs, WITHOUT_HISTORIES, area, database)
-        tasks = (piece_task(number, piece, settings, room) for number, piece in enumerate(pieces))
-        done = sorted(results(tasks, PIECES, workers), key=lambda one: one[0].number)
+    settings, folder = context.settings, context.folder
     remove_other_parts(folder / "rows", ())
+    named, done = _pieces(context, pairs, room)
     rows, buildings = zip(*(task.files for task, _ in done), strict=True)
     found = [piece for _, piece in done]
     # The next row of the whole is the next one of a part
@@ -120,6 +129,20 @@ def _without_histories(
     return BuildingRowsDone(outputs, _counts(count, folder, ()), rejected, served=served)
 
 
+def _pieces(
+    context: RunContext, pairs: RankedTable, room: Path
+) -> tuple[int, list[tuple[PieceTask, PieceRows]]]:
+    """Do all pieces; return the number of named buildings, and the pieces in their order."""
+    settings = context.settings
+    with one_thread_database(room) as database:
+        area = settings.totals.area or PLACE
+        named, pieces = connected_pieces(pairs, WITHOUT_HISTORIES, area, database)
+        # Made as they are asked for, a few ahead of the workers
+        tasks = (piece_task(number, piece, settings, room) for number, piece in enumerate(pieces))
+        done = list(results(tasks, PIECES, context.workers))
+    return named, sorted(done, key=lambda one: one[0].number)
+
+
 def _counts(rows: int, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
     """Return the numbers of rows, buildings and chunks."""
     buildings = pq.read_metadata((folder / "buildings.parquet").absolute())
@@ -129,12 +152,6 @@ def _counts(rows: int, folder: Path, parts: Sequence[Part]) -> dict[str, int]:
         "row_chunks": len(parts),
         "row_chunks_resumed": sum(part.resumed for part in parts),
     }
-
-
-def _has_histories(settings: Run) -> bool:
-    """Return whether rows are followed: as pairs are, unless the settings say otherwise."""
-    exact = settings.rows.exact
-    return settings.screening.exact if exact is None else exact
 
 
 def _tasks(folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsTask]:

@@ -488,18 +488,15 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
     result = empty_population(motion.row.size)
     if not motion.row.size:
         return result
+    # all that a few calls make of all pairs
     facts = _facts(pairs, motion.log_std, np.ones(motion.row.size))
-    buildings, correlations = _estimates(motion, spectra, pairs)
-    size = SAMPLES // len(NODES)
+    columns = (*_estimates(motion, spectra, pairs), facts)
+    size, blocks = SAMPLES // len(NODES), list[_OfNodes]()
     # blocks bound the memory; a pair does not depend on its block
-    blocks = list[_OfNodes]()
     for first in range(0, motion.row.size, size):
-        columns = (buildings, correlations, facts)
-        of_buildings, alike, known = (
-            np.ascontiguousarray(rows[:, first : first + size]) for rows in columns
-        )
-        row = motion.row[first : first + size]
-        moved = _at_nodes(spectra, row, of_buildings, alike, NODES)
+        some = slice(first, first + size)
+        buildings, alike, known = (np.ascontiguousarray(rows[:, some]) for rows in columns)
+        moved = _at_nodes(spectra, motion.row[some], buildings, alike, NODES)
         blocks.append(_of_nodes(moved, known, NODES))
     found = _OfNodes(*(np.concatenate(rows, axis=1) for rows in zip(*blocks, strict=True)))
     for name, column in _columns(found, pairs).items():
