@@ -33,7 +33,7 @@ from per_obspy.buildings.contacts import (
     contacts_of,
     numbers_in,
 )
-from per_obspy.buildings.histories import NEEDED
+from per_obspy.buildings.histories import ALONE, NEEDED
 from per_obspy.buildings.sides import OF_PAIRS
 from per_obspy.checks import FloatArray
 from per_obspy.config.pairs import Rows
@@ -59,7 +59,7 @@ AREA = "area_of_totals"
 #: Columns of pairs that contacts keep besides those of their rows; some may be absent. Those that
 #: only a history needs are most of them.
 CARRIED = tuple(
-    dict.fromkeys(("pair_id", "rank", "longitude", "latitude", *NEEDED, *OF_PAIRS, AREA))
+    dict.fromkeys(("pair_id", "rank", "longitude", "latitude", *NEEDED, *ALONE, *OF_PAIRS, AREA))
 )
 WITHOUT_HISTORIES = tuple(
     name
@@ -71,7 +71,7 @@ WITHOUT_HISTORIES = tuple(
 OF_CHUNKS = (
     "row_id", "flags", "turned", "interface", "buildings", "azimuth", "station",
     *(f"building_{name}_{side}" for side in ("left", "right") for name in ("number", "id")),
-    "pair_id", "longitude", "latitude", *NEEDED,
+    "pair_id", "longitude", "latitude", *NEEDED, *ALONE,
 )  # fmt: skip
 
 #: Columns of few texts, which many contacts share.
@@ -125,6 +125,7 @@ def find_rows(
     """
     carried = CARRIED if histories else WITHOUT_HISTORIES
     columns = {name: name for name in (*FINDING, *carried)} | ({AREA: area} if area else {})
+    columns |= ALONE if histories else {}
     found = list[PieceRows]()
     ordered = room / "contacts.parquet"
     with one_thread_database(room) as database, database.cursor() as inner:
@@ -258,6 +259,16 @@ def _pieces(database: duckdb.DuckDBPyConnection) -> Iterator[pa.Table]:
             yield table.slice(start, end - start)
 
 
+def _under_one_record(contacts: pa.Table, station: pa.ChunkedArray) -> pa.Table:
+    """Return contacts without the histories of pairs of another station than that of the row."""
+    is_same = pc.equal(station, contacts["station"])
+    for place, name in enumerate(contacts.column_names):
+        if name in ALONE:
+            known = pc.if_else(is_same, contacts[name], None)
+            contacts = contacts.set_column(place, name, known)
+    return contacts
+
+
 class PieceRows(NamedTuple):
     """Rows of buildings of a piece of the risk table."""
 
@@ -292,6 +303,7 @@ def find_in_piece(
     table = kept.take(pa.array(chains.pair))
     for name, column in columns.items():
         table = table.append_column(name, column)
+    table = _under_one_record(table, pairs["station"].take(pa.array(chains.pair)))
     # And what is found besides
     served = served_buildings(pairs["station"].to_pandas(), contacts.buildings)
     rejected = [*contacts.rejected, *joints.rejected]
