@@ -68,9 +68,10 @@ def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArr
     Return the rows of each block: of equal refinement, 32 buildings at most in all.
 
     Of ``some`` rows, by their first buildings and steps per sampling interval; a row of more than
-    32 buildings is a separate block.
+    32 buildings is a separate block. The longest rows, which take longest, are first.
     """
     sizes = np.diff(first)
+    some = some[np.argsort(-sizes[some], kind="stable")]
     blocks = []
     for part in np.unique(parts[some]):
         block: list[int] = []

@@ -5,12 +5,13 @@ A building has the norm ``w² = v² + 2 e u v + omega² u²``, with its displace
 rests. With ``e = xi omega`` the root w falls like ``exp(-e t)`` in free vibration, and rises by the
 integral of the size of its force per unit mass at most.
 
-Buildings without a gap between them that rest in one place are a *group*, with the norm ``W² = sum m w²`` and one e
-for all, the smallest ``xi omega``. A contact force F between neighbours, an impulse too, changes
-the product ``e sum m u v`` by ``e F (u_right - u_left) = 0``, and never adds kinetic energy. So W
-rises by the integral of the size of the ground acceleration times the root of ``sum m q²`` at most,
-with participations q, and falls like ``exp(-e t)``; the rate of a building of larger ``xi omega``
-leaves ``2 e`` by ``e² (xi omega - e) / (omega² - e²)`` of W² at most.
+Buildings without a gap between them that rest in one place are a *group*, with the norm
+``W² = sum m w²`` and one e for all, the smallest ``xi omega``. A contact force F between
+neighbours, an impulse too, changes the product ``e sum m u v`` by ``e F (u_right - u_left) = 0``,
+and never adds kinetic energy. So W rises by the integral of the size of the ground acceleration
+times the root of ``sum m q²`` at most, with participations q, and falls like ``exp(-e t)``; the
+rate of a building of larger ``xi omega`` leaves ``2 e`` by ``e² (xi omega - e) / (omega² - e²)`` of
+W² at most.
 
 Groups are followed as if they did not touch each other. That holds as long as the displacements on
 both sides of a gap together stay below it. Equal buildings that have the same state move as one
