@@ -43,10 +43,10 @@ from per_obspy.pounding.row_tables import (
     RowScales,
     building_table,
     checked_rows,
-    parts_of,
     row_scales,
     run_in_parts,
     some_buildings,
+    two_by_two,
 )
 from per_obspy.pounding.row_tables import (
     BuildingRows as BuildingRows,
@@ -390,11 +390,11 @@ def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bo
     azimuth = np.repeat(rows.azimuth, np.diff(rows.first))
     alone = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
     maxima = np.stack([alone.sd, alone.per], axis=1)
-    # Those that yield are rows of one building
-    others = (alone.sd > rows.yield_displacement) | (not free_vibration)
-    if others.any():
-        single = parts_of(rows, np.ones_like(others), others)
-        maxima[others] = _run(ground, dt, single, free_vibration)[:, :2]
+    # Those that yield in pairs that never meet, of which a block takes more than of rows
+    others = np.flatnonzero((alone.sd > rows.yield_displacement) | (not free_vibration))
+    if others.size:
+        both, pairs = two_by_two(rows, others)
+        maxima[both] = _run(ground, dt, pairs, free_vibration)[:, :2]
     return maxima
 
 

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_lanes.run_block import UNREACHABLE
 from per_obspy.pounding.kernel_tables import kernel_table, refuse_pressed_walls
 from per_obspy.pounding.structure import PAIR_CHECKS
 
@@ -139,6 +140,18 @@ def some_buildings(rows: BuildingRows, buildings: IntArray, first: IntArray) -> 
     fields = {name: getattr(rows, name)[buildings] for name in BUILDING_FIELDS}
     row = np.searchsorted(rows.first, buildings[first[:-1]], side="right") - 1
     return with_ends(BuildingRows(first, **fields, azimuth=rows.azimuth[row]))
+
+
+def two_by_two(rows: BuildingRows, some: IntArray) -> tuple[IntArray, BuildingRows]:
+    """Return some buildings of each row two by two, the last perhaps twice, and as pairs apart."""
+    row = np.searchsorted(rows.first, some, side="right") - 1
+    left = np.flatnonzero((np.arange(some.size) - np.searchsorted(row, row)) % 2 == 0)
+    right = left + np.append(row[1:] == row[:-1], False)[left]
+    both = some[np.stack([left, right], axis=1).ravel()]
+    pairs = some_buildings(rows, both, 2 * np.arange(left.size + 1))
+    # A gap that never closes, and no walls
+    gap, mass = np.full(both.size, UNREACHABLE), np.ones(both.size)
+    return both, pairs._replace(gap=gap, mass=mass)
 
 
 class RowScales(NamedTuple):
