@@ -72,13 +72,10 @@ ROWS: tuple[Column, ...] = (
     _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
     _number("impact_velocity_84", "m/s", "impact_velocity that 84 in 100 contacts do not exceed"),
     _count(
-        "impacts_alone", "impacts of the pair alone, counted as in impacts, under the same motion"
+        "impacts_alone",
+        "impacts of the pair alone; as in risk.parquet where it meets others in the row",
     ),
-    _number(
-        "impact_velocity_alone",
-        "m/s",
-        "largest approach velocity of the pair alone, under the same motion",
-    ),
+    _number("impact_velocity_alone", "m/s", "largest approach velocity of that pair, 0 if none"),
     _number("longitude", "degrees", "longitude of the middle of the pair or of the building, east"),
     _number("latitude", "degrees", "latitude of the middle of the pair or of the building, north"),
     _text("flags", "flags of the row, separated by spaces, each explained in a row flag_..."),

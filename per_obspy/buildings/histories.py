@@ -3,9 +3,10 @@ Exact histories of rows of buildings under the record of their station.
 
 Each building is one oscillator, described by the pairs on both sides of it. The two may differ in
 derived or rounded values: a known value goes before a derived one, and of two alike the mean is
-taken, so that a row read backwards is the same row. Every contact is followed twice: in its row,
-and as a pair of the same two buildings alone under the same motion, so that their difference is the
-effect of the other neighbours.
+taken, so that a row read backwards is the same row. Every contact has two histories: in its row,
+and as a pair of the same two buildings alone under the same record, so that their difference is the
+effect of the other neighbours. That pair is the one of the risk table, whose record and axis it
+has; it is followed here only where the table has no such history.
 """
 
 from typing import Any, NamedTuple
@@ -24,6 +25,14 @@ NOTED = 0.01
 
 #: Properties of an oscillator that a pair gives as they are.
 PROPERTIES = ("period", "damping", "yield_displacement", "hardening")
+
+#: Exact history of a pair: names of its columns among contacts, and in the risk table.
+ALONE = {
+    "impacts_alone": "impacts",
+    "impact_velocity_alone": "impact_velocity_exact",
+    "amplification_alone_1": "amplification_exact_1",
+    "amplification_alone_2": "amplification_exact_2",
+}
 
 #: Columns of contacts that :func:`members_of` reads, besides ``turned``.
 NEEDED = (
@@ -62,13 +71,15 @@ def row_outcomes(
     oscillators, m.
     """
     members = members_of(contacts, first, azimuth)
-    row, alone = row_and_pair_maxima(*motion, members.rows)
-    velocity, sizes = row.impact_velocity[members.left], np.diff(first)
+    left, right = members.left, members.right
+    wanted = np.zeros(right[-1] + 1, dtype=bool)
+    wanted[left] = np.isnan(values(contacts, "impact_velocity_alone")) | members.reconciled
+    row, pairs = row_and_pair_maxima(*motion, members.rows, wanted)
+    velocity, sizes = row.impact_velocity[left], np.diff(first)
     # Rows depend twice as much on the contact as pairs
     contact_std = values(contacts, "contact_log_std") * np.where(np.repeat(sizes, sizes) > 1, 2, 1)
     # Both buildings of each contact
-    left, right = members.left, members.right
-    amplification, of_pair = _amplification(row), _amplification(alone)[left]
+    amplification = _amplification(row)
     return {
         "impacts": row.impacts[left].astype(np.float64),
         "impact_velocity": velocity,
@@ -78,12 +89,22 @@ def row_outcomes(
         "displacement_left": row.displacement[left],
         "displacement_right": row.displacement[right],
         # Without the others of the row
-        "impacts_alone": alone.impacts[left, 0].astype(np.float64),
-        "impact_velocity_alone": alone.impact_velocity[left, 0],
-        "amplification_alone_left": of_pair[:, 0],
-        "amplification_alone_right": of_pair[:, 1],
+        **_alone(pairs, members.left, contacts),
         "reconciled": members.reconciled,
     }
+
+
+def _alone(pairs: RowMaxima, left: IntArray, contacts: Table) -> Columns:
+    """Return the outcomes of contacts without the others of their row: computed, or known."""
+    hits = pairs.impacts[left, 0], pairs.impact_velocity[left, 0]
+    computed = np.stack([*hits, *_amplification(pairs)[left].T])
+    # Building 2 of a turned pair is on the left
+    is_turned, known = np.asarray(contacts["turned"], dtype=bool), np.empty_like(computed)
+    for number, name in enumerate(ALONE):
+        known[number] = values(contacts, name)
+    known[2:] = np.where(is_turned, known[:1:-1], known[2:])
+    outcomes = np.where(np.isnan(computed[1]), known, computed)
+    return dict(zip(OUTCOMES[7:11], outcomes, strict=True))
 
 
 def no_outcomes(count: int) -> Columns:

@@ -33,7 +33,7 @@ from per_obspy.buildings.contacts import (
     contacts_of,
     numbers_in,
 )
-from per_obspy.buildings.histories import NEEDED
+from per_obspy.buildings.histories import ALONE, NEEDED
 from per_obspy.buildings.sides import OF_PAIRS
 from per_obspy.checks import FloatArray
 from per_obspy.config.pairs import Rows
@@ -59,19 +59,19 @@ AREA = "area_of_totals"
 #: Columns of pairs that contacts keep besides those of their rows; some may be absent. Those that
 #: only a history needs are most of them.
 CARRIED = tuple(
-    dict.fromkeys(("pair_id", "rank", "longitude", "latitude", *NEEDED, *OF_PAIRS, AREA))
+    dict.fromkeys(("pair_id", "rank", "longitude", "latitude", *NEEDED, *ALONE, *OF_PAIRS, AREA))
 )
 WITHOUT_HISTORIES = tuple(
     name
     for name in CARRIED
-    if name not in NEEDED or name in OF_PAIRS or name in {column.name for column in ROWS}
+    if name not in (*NEEDED, *ALONE) or name in OF_PAIRS or name in {column.name for column in ROWS}
 )
 
 #: Columns of a contact that its history and its row of ``rows.parquet`` need.
 OF_CHUNKS = (
     "row_id", "flags", "turned", "interface", "buildings", "azimuth", "station",
     *(f"building_{name}_{side}" for side in ("left", "right") for name in ("number", "id")),
-    "pair_id", "longitude", "latitude", *NEEDED,
+    "pair_id", "longitude", "latitude", *NEEDED, *ALONE,
 )  # fmt: skip
 
 #: Columns of few texts, which many contacts share.
@@ -148,7 +148,8 @@ def connected_pieces(
 
     Pieces, made as they are asked for, have the columns that :func:`find_in_piece` needs.
     """
-    columns = {name: name for name in (*FINDING, *carried)} | ({AREA: area} if area else {})
+    columns = {name: ALONE.get(name, name) for name in (*FINDING, *carried)}
+    columns |= {AREA: area} if area else {}
     # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
     codes = number_buildings(pairs, database)
     database.register("pairs", _numbered(pairs, columns, codes))
@@ -275,6 +276,16 @@ def _pieces(database: duckdb.DuckDBPyConnection) -> Iterator[pa.Table]:
             yield table.slice(start, end - start)
 
 
+def _under_one_record(contacts: pa.Table, station: pa.ChunkedArray) -> pa.Table:
+    """Return contacts without the histories of pairs of another station than that of the row."""
+    is_same = pc.equal(station, contacts["station"])
+    for place, name in enumerate(contacts.column_names):
+        if name in ALONE:
+            known = pc.if_else(is_same, contacts[name], None)
+            contacts = contacts.set_column(place, name, known)
+    return contacts
+
+
 class PieceRows(NamedTuple):
     """Rows of buildings of a piece of the risk table."""
 
@@ -309,6 +320,7 @@ def find_in_piece(
     table = kept.take(pa.array(chains.pair))
     for name, column in columns.items():
         table = table.append_column(name, column)
+    table = _under_one_record(table, pairs["station"].take(pa.array(chains.pair)))
     # And what is found besides
     served = served_buildings(pairs["station"].to_pandas(), contacts.buildings)
     rejected = [*contacts.rejected, *joints.rejected]

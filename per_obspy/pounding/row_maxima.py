@@ -39,16 +39,17 @@ from per_obspy.pounding.kernel_tables import (
     run_blocks,
 )
 from per_obspy.pounding.row_tables import (
-    BuildingRows as BuildingRows,
-)
-from per_obspy.pounding.row_tables import (
+    BoolArray,
     RowScales,
     building_table,
     checked_rows,
-    parts_of,
     row_scales,
     run_in_parts,
     some_buildings,
+    two_by_two,
+)
+from per_obspy.pounding.row_tables import (
+    BuildingRows as BuildingRows,
 )
 from per_obspy.spectra.elastic import azimuth_maxima
 from per_obspy.threads import map_in_threads
@@ -67,9 +68,10 @@ def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArr
     Return the rows of each block: of equal refinement, 32 buildings at most in all.
 
     Of ``some`` rows, by their first buildings and steps per sampling interval; a row of more than
-    32 buildings is a separate block.
+    32 buildings is a separate block. The longest rows, which take longest, are first.
     """
     sizes = np.diff(first)
+    some = some[np.argsort(-sizes[some], kind="stable")]
     blocks = []
     for part in np.unique(parts[some]):
         block: list[int] = []
@@ -317,15 +319,14 @@ def row_maxima(
     Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
     (8).
     """
-    maxima, _ = _maxima(north, east, dt, rows, free_vibration, with_pairs=False)
-    return maxima
+    return _maxima(north, east, dt, rows, free_vibration, np.zeros(len(rows.period), bool))[0]
 
 
 def row_and_pair_maxima(
-    north: ArrayLike, east: ArrayLike, dt: float, rows: BuildingRows
+    north: ArrayLike, east: ArrayLike, dt: float, rows: BuildingRows, wanted: BoolArray
 ) -> tuple[RowMaxima, RowMaxima]:
     """
-    Compute `row_maxima` and those of every two neighbours without the others of their row.
+    Compute `row_maxima` and those of neighbours without the others of their row.
 
     Two neighbours that meet no other one in their row are computed once for both.
 
@@ -333,19 +334,22 @@ def row_and_pair_maxima(
     ----------
     north, east, dt, rows
         As in `row_maxima`; free vibration is followed.
+    wanted : (n_buildings,) ndarray of bool
+        Whether a building and the next one are computed alone even if they meet others.
 
     Returns
     -------
     rows, pairs : RowMaxima
         One entry per building; the pairs have one line per building, ``(n_buildings, 2)``, of it
-        and the next one, without meaning for the last of each row.
+        and the next one, without meaning for the last of each row. Pairs that are not wanted and
+        meet others are NaN, without impacts.
 
     Raises
     ------
     ValueError, RuntimeError
         As `row_maxima`.
     """
-    return _maxima(north, east, dt, rows, free_vibration=True, with_pairs=True)
+    return _maxima(north, east, dt, rows, True, wanted)
 
 
 def _maxima(
@@ -354,7 +358,7 @@ def _maxima(
     dt: float,
     rows: BuildingRows,
     free_vibration: bool,
-    with_pairs: bool,
+    wanted: BoolArray,
 ) -> tuple[RowMaxima, RowMaxima]:
     # The ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
@@ -368,7 +372,7 @@ def _maxima(
     maxima[:, :2] = _alone(ground, step, checked, free_vibration)
     free = maxima[:, 1].copy()
     pairs = run_in_parts(
-        checked, maxima, lambda parts: _run(ground, step, parts, free_vibration), with_pairs
+        checked, maxima, lambda parts: _run(ground, step, parts, free_vibration), wanted
     )
     next_free = np.stack([free, np.append(free[1:], 0.0)], axis=1)
     return _row_maxima(maxima, free), _row_maxima(pairs, next_free)
@@ -376,7 +380,8 @@ def _maxima(
 
 def _row_maxima(maxima: FloatArray, free_radius: FloatArray) -> RowMaxima:
     displacement, radius, impact_velocity, impacts = np.moveaxis(maxima, -1, 0)
-    return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
+    counts = np.nan_to_num(impacts).astype(np.int64)
+    return RowMaxima(radius, free_radius, displacement, counts, impact_velocity)
 
 
 def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool) -> FloatArray:
@@ -385,11 +390,11 @@ def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bo
     azimuth = np.repeat(rows.azimuth, np.diff(rows.first))
     alone = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
     maxima = np.stack([alone.sd, alone.per], axis=1)
-    # Others are rows of one building
-    others = np.isfinite(rows.yield_displacement) | (not free_vibration)
-    if others.any():
-        single = parts_of(rows, np.ones_like(others), others)
-        maxima[others] = _run(ground, dt, single, free_vibration)[:, :2]
+    # Those that yield in pairs that never meet, of which a block takes more than of rows
+    others = np.flatnonzero((alone.sd > rows.yield_displacement) | (not free_vibration))
+    if others.size:
+        both, pairs = two_by_two(rows, others)
+        maxima[both] = _run(ground, dt, pairs, free_vibration)[:, :2]
     return maxima
 
 

@@ -14,7 +14,8 @@ A gap that never closes divides a row into parts: the buildings on both sides mo
 there. So the motions of both parts, each computed alone, are the motion of the row wherever their
 largest displacements together stay below the gap: this motion satisfies every equation of the row,
 which has one solution only. Where they may close the gap, the two parts are one, and are computed
-again.
+again. For the same reason neighbours of one equation of motion and equal contact heights, which no
+other building hits, are parts of one building each, whatever their gap: they move in step.
 """
 
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_lanes.run_block import UNREACHABLE
 from per_obspy.pounding.kernel_tables import kernel_table, refuse_pressed_walls
 from per_obspy.pounding.structure import PAIR_CHECKS
 
@@ -140,6 +142,18 @@ def some_buildings(rows: BuildingRows, buildings: IntArray, first: IntArray) -> 
     return with_ends(BuildingRows(first, **fields, azimuth=rows.azimuth[row]))
 
 
+def two_by_two(rows: BuildingRows, some: IntArray) -> tuple[IntArray, BuildingRows]:
+    """Return some buildings of each row two by two, the last perhaps twice, and as pairs apart."""
+    row = np.searchsorted(rows.first, some, side="right") - 1
+    left = np.flatnonzero((np.arange(some.size) - np.searchsorted(row, row)) % 2 == 0)
+    right = left + np.append(row[1:] == row[:-1], False)[left]
+    both = some[np.stack([left, right], axis=1).ravel()]
+    pairs = some_buildings(rows, both, 2 * np.arange(left.size + 1))
+    # A gap that never closes, and no walls
+    gap, mass = np.full(both.size, UNREACHABLE), np.ones(both.size)
+    return both, pairs._replace(gap=gap, mass=mass)
+
+
 class RowScales(NamedTuple):
     """Displacement of building k, and clearance after it, in the units of the table, (n,)."""
 
@@ -193,6 +207,22 @@ def stays_open(rows: BuildingRows, displacement: FloatArray) -> BoolArray:
     return np.asarray(is_open)
 
 
+def moves_in_step(rows: BuildingRows) -> BoolArray:
+    """Return after which buildings the next one has the same motion at contact, if none hits it."""
+    is_same = np.append(rows.participation_right[:-1] == rows.participation_left[1:], False)
+    for name in ("period", "damping", "yield_displacement", "hardening"):
+        column = getattr(rows, name)
+        is_same[:-1] &= column[:-1] == column[1:]
+    return is_same
+
+
+def _ends(rows: BuildingRows, displacement: FloatArray, before: BoolArray) -> BoolArray:
+    """Return after which buildings, of those before, a gap stays open or all move in step."""
+    is_open, in_step = before & stays_open(rows, displacement), before & moves_in_step(rows)
+    is_pushed = _counted(is_open, ~(is_open | in_step)) > 0.0
+    return is_open | (in_step & ~is_pushed)
+
+
 def parts_of(rows: BuildingRows, is_end: BoolArray, chosen: BoolArray) -> BuildingRows:
     """Return parts of rows, each to a building that ``is_end``, of which all or none is chosen."""
     ends = np.flatnonzero(is_end[chosen]) + 1
@@ -203,7 +233,7 @@ def run_in_parts(
     rows: BuildingRows,
     maxima: FloatArray,
     run: Callable[[BuildingRows], FloatArray],
-    with_pairs: bool,
+    wanted: BoolArray,
 ) -> FloatArray:
     """
     Compute the maxima of rows by their parts, and those of pairs of neighbours alone.
@@ -211,26 +241,33 @@ def run_in_parts(
     ``maxima`` (n_buildings, n_maxima) are those of every building alone, its displacement first;
     then those in its row. ``run`` returns the maxima of checked rows of two buildings and more. A
     part of two buildings is a pair alone, and is computed once for both; pairs of longer parts only
-    ``with_pairs``. Return the maxima of each building and the next one without the others of their
-    row, (n_buildings, 2, n_maxima): without contact where their gap stays open, and where the pair
-    is not computed.
+    where the pair of a building and the next one is ``wanted``. Return the maxima of each building
+    and the next one without the others of their row, (n_buildings, 2, n_maxima): without contact
+    where their gap stays open or they move in step, NaN where the pair is not computed.
     """
-    is_end = stays_open(rows, maxima[:, 0])
+    in_step = moves_in_step(rows)
+    is_end = _ends(rows, maxima[:, 0], np.ones_like(in_step))
     number = _counted(is_end, np.ones_like(is_end))
 
     # Parts of two among the pairs that may meet
-    two = np.flatnonzero(~is_end & (number == 2))
-    left = np.flatnonzero(~is_end) if with_pairs else two
+    may_meet = ~is_end & ~in_step
+    two = np.flatnonzero(may_meet & (number == 2))
+    left = np.flatnonzero(may_meet & (wanted | (number == 2)))
     after = np.minimum(np.arange(1, len(maxima) + 1), len(maxima) - 1)
     pairs = np.stack([maxima, maxima[after]], axis=1)
-    # A pair alone has no other neighbours
+    pairs[may_meet] = np.nan
+    # Both of each pair, which has no other neighbours
     if left.size:
-        both = np.stack([left, left + 1], axis=1).ravel()
-        alone = run(some_buildings(rows, both, 2 * np.arange(left.size + 1)))
-        pairs[left] = alone.reshape(left.size, 2, -1)
+        pairs[left] = run(_pairs_of(rows, left)).reshape(left.size, 2, -1)
     maxima[two], maxima[two + 1] = pairs[two, 0], pairs[two, 1]
     _run_longer(rows, maxima, run, is_end, number > 2)
     return pairs
+
+
+def _pairs_of(rows: BuildingRows, left: IntArray) -> BuildingRows:
+    """Return some buildings, each with the next one, as rows without other neighbours."""
+    both = np.stack([left, left + 1], axis=1).ravel()
+    return some_buildings(rows, both, 2 * np.arange(left.size + 1))
 
 
 def _run_longer(
@@ -244,10 +281,10 @@ def _run_longer(
     while True:
         if waiting.any():
             maxima[waiting] = run(parts_of(rows, is_end, waiting))
-        closes = is_end & ~stays_open(rows, maxima[:, 0])
+        before, is_end = is_end, _ends(rows, maxima[:, 0], is_end)
+        closes = before & ~is_end
         if not closes.any():
             return
-        is_end = is_end & ~closes
         waiting = _counted(is_end, closes) > 0.0
 
 

@@ -39,6 +39,9 @@ def contacts(count, seed=5, **columns):
         table[f"damping_{i}"] = np.full(count, 0.05)
         table[f"yield_displacement_{i}"] = np.full(count, np.inf)
         table[f"hardening_{i}"] = np.zeros(count)
+        table[f"amplification_alone_{i}"] = np.full(count, np.nan)
+    # the table has no history of the pairs
+    table["impacts_alone"] = table["impact_velocity_alone"] = np.full(count, np.nan)
     return table | columns
 
 

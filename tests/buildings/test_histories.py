@@ -66,6 +66,26 @@ def test_the_pair_alone_has_no_other_neighbours():
     assert not np.allclose(row["impact_velocity"], row["impact_velocity_alone"], rtol=1e-3)
 
 
+def test_a_pair_that_meets_others_alone_is_that_of_the_risk_table():
+    # three touching buildings and two; then the same without the history of the first pair
+    table = with_one_turned(contacts(4, gap=np.array([0.0, 0.0, 5.0, 0.0])))
+    computed = outcomes(table)
+    history = {"impacts_alone": 7.0, "impact_velocity_alone": 0.5}
+    history |= {"amplification_alone_1": 1.1, "amplification_alone_2": 1.2}
+    found = outcomes(table | {name: np.full(4, value) for name, value in history.items()})
+    rest = outcomes(table | {name: np.append(np.nan, [v] * 3) for name, v in history.items()})
+    expected = {"impacts": [7] * 2, "impact_velocity": [0.5] * 2}
+    expected |= {"amplification_left": [1.1, 1.2], "amplification_right": [1.2, 1.1]}
+    for name in OUTCOMES[:-1]:
+        stem = name.replace("_alone", "")
+        # the others of the row have no effect on the last pair
+        own = computed[name] if stem == name else [*expected[stem], *computed[name][2:]]
+        np.testing.assert_array_equal(found[name], own)
+        own = computed[name] if stem == name else [computed[name][0], *own[1:]]
+        np.testing.assert_array_equal(rest[name], own)
+    assert computed["impacts_alone"][3] == computed["impacts"][3] > 0
+
+
 def test_a_mirrored_row_does_the_same():
     table = contacts(3)
     found, other = outcomes(table), outcomes(turned(table), azimuth=240.0)
@@ -74,15 +94,20 @@ def test_a_mirrored_row_does_the_same():
     np.testing.assert_allclose(left[::-1], right, **CHAOS)
 
 
-def test_a_turned_pair_is_the_same_pair():
-    table = contacts(3)
+def with_one_turned(table):
+    """Return a table of which buildings 1 and 2 of the second pair are exchanged."""
     pairs = {name: column.copy() for name, column in table.items()}
     for name in list(pairs):
         if name.endswith("_1"):
             other = f"{name[:-1]}2"
             pairs[name][1], pairs[other][1] = table[other][1], table[name][1]
-    pairs["turned"] = np.array([False, True, False])
-    expected, found = outcomes(table), outcomes(pairs)
+    pairs["turned"][1] = True
+    return pairs
+
+
+def test_a_turned_pair_is_the_same_pair():
+    table = contacts(3)
+    expected, found = outcomes(table), outcomes(with_one_turned(table))
     for name in OUTCOMES:
         np.testing.assert_array_equal(found[name], expected[name])
 

@@ -120,6 +120,12 @@ def test_stations_of_repeated_contacts_take_no_part():
     assert set(found_in(pairs, ["B", "A", "B"])[0]["station"]) == {"B"}
 
 
+def test_a_pair_has_a_history_of_its_own_only_under_the_record_of_its_row():
+    pairs = street(*((*pair, 10.0, 0.1) for pair in ("ab", "bc", "cd")))
+    found, _ = found_in(pairs.assign(impact_velocity_alone=0.3), ["B", "A", "B"])
+    np.testing.assert_array_equal(found["impact_velocity_alone"], [0.3, np.nan, 0.3])
+
+
 def test_buildings_are_counted_by_the_stations_of_their_pairs():
     pairs = street(("a", "b", 10.0, 0.1), ("b", "c", 10.0, 0.1), ("c", "d", 10.0, 0.1))
     assert found_in(pairs, ["A", "A", ""])[1].served == {"A": 3}

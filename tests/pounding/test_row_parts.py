@@ -11,7 +11,13 @@ from per_obspy.pounding.row_maxima import (
     row_and_pair_maxima,
     row_maxima,
 )
-from per_obspy.pounding.row_tables import checked_rows, parts_of, run_in_parts, stays_open
+from per_obspy.pounding.row_tables import (
+    checked_rows,
+    moves_in_step,
+    parts_of,
+    run_in_parts,
+    stays_open,
+)
 from per_obspy.pounding.structure import Structure
 
 DT = 0.02
@@ -77,9 +83,27 @@ def test_a_gap_that_closes_only_because_of_another_impact():
     assert_allclose(found.radius, history.per, rtol=1e-6)  # required of maxima
 
 
+def test_buildings_that_move_in_step_are_computed_only_if_another_hits_them(monkeypatch):
+    # catches: neighbours in step whose motion another building disturbs, at once or in the end
+    walls = row_of([0.0, 0.2, 0.0], [2.0, 0.6, 0.6, 0.6], [50.0, 1.0, 2.0, 1.0])
+    for rows in (walls, walls._replace(gap=np.zeros(4))):
+        expected = complete(monkeypatch, rows)
+        found = row_maxima(PULSE, 0.0 * PULSE, DT, rows)
+        assert expected.impacts[:3].all()
+        for name, values in expected._asdict().items():
+            assert_allclose(getattr(found, name), values, rtol=1e-9, err_msg=name)  # both are exact
+    # without the first no one is hit, whatever the masses: nothing is computed
+    alike = checked_rows(row_of([0.0, 0.2], [0.6] * 3, [1.0, 2.0, 1.0]))
+    maxima = np.ones((3, 1))
+    pairs = run_in_parts(alike, maxima, lambda _: pytest.fail("computed"), np.ones(3, bool))
+    assert_array_equal(pairs[:2], 1.0)
+    alike.participation_left[1] = 1.1
+    assert_array_equal(moves_in_step(alike), [False, True, False])
+
+
 def test_parts_are_joined_until_no_gap_closes():
     # catches: a gap that only the part of two joined parts closes, parts that are not run again
-    rows = checked_rows(row_of([1.0, 1.0, 1.0, 2.0], [1.0] * 5, [1.0] * 5))
+    rows = checked_rows(row_of([1.0, 1.0, 1.0, 2.0], [1.0, 2.0, 1.0, 2.0, 1.0], [1.0] * 5))
     alone = np.array([[0.6, 0.5, 0.1, 0.1, 0.1]]).T
     seen = []
 
@@ -90,14 +114,14 @@ def test_parts_are_joined_until_no_gap_closes():
 
     # the motion of the first two reaches 0.6 m
     maxima = alone.copy()
-    run_in_parts(rows, maxima, run, False)
+    run_in_parts(rows, maxima, run, np.zeros(5, dtype=bool))
     assert seen == [[2]]
     assert_array_equal(maxima[:, 0], [0.6, 0.6, 0.1, 0.1, 0.1])
     # that of three 0.9 m, that of four 1.2 m
     rows.gap[1] = 0.7
     maxima = alone.copy()
     seen.clear()
-    run_in_parts(rows, maxima, run, False)
+    run_in_parts(rows, maxima, run, np.zeros(5, dtype=bool))
     assert seen == [[2], [3], [4]]
     assert_allclose(maxima[:, 0], [1.2, 1.2, 1.2, 1.2, 0.1], rtol=1e-12)
 
@@ -138,7 +162,10 @@ def test_parts_have_the_axis_and_the_buildings_of_their_rows():
 def test_pairs_alone_have_no_other_neighbours():
     # catches: a pair with the gap or the axis of another, a part of two computed once more
     rows = row_of([0.001, 5.0, 0.01, 0.02], [0.5, 0.9, 0.6, 1.1, 0.4], [2.0, 1.0, 3.0, 1.0, 2.0])
-    found, pairs = row_and_pair_maxima(PULSE, 0.0 * PULSE, DT, rows)
+    wanted = np.array([True] * 3 + [False] * 2)
+    _, some = row_and_pair_maxima(PULSE, 0.0 * PULSE, DT, rows, wanted)
+    assert_array_equal(np.isnan(some.radius[:4, 0]), [False] * 3 + [True])
+    found, pairs = row_and_pair_maxima(PULSE, 0.0 * PULSE, DT, rows, np.ones(5, dtype=bool))
     expected = row_maxima(PULSE, 0.0 * PULSE, DT, rows)
     for name, values in expected._asdict().items():
         assert_array_equal(getattr(found, name), values, err_msg=name)
@@ -157,7 +184,7 @@ def test_pairs_alone_have_no_other_neighbours():
 
 def test_a_part_of_two_is_computed_once_for_its_row_and_alone():
     # catches: pairs alone that are computed again
-    rows = checked_rows(row_of([0.1, 5.0, 0.1, 0.1], [1.0] * 5, [1.0] * 5))
+    rows = checked_rows(row_of([0.1, 5.0, 0.1, 0.1], [1.0, 2.0, 1.0, 2.0, 1.0], [1.0] * 5))
     seen = []
 
     def run(parts):
@@ -165,7 +192,7 @@ def test_a_part_of_two_is_computed_once_for_its_row_and_alone():
         return np.arange(1.0, parts.period.size + 1.0)[:, None]
 
     maxima = np.full((5, 1), 0.3)
-    pairs = run_in_parts(rows, maxima, run, True)
+    pairs = run_in_parts(rows, maxima, run, np.ones(5, dtype=bool))
     assert seen == [[2, 2, 2], [3]]
     assert_array_equal(pairs[[0, 2, 3], :, 0], [[1, 2], [3, 4], [5, 6]])
     assert_array_equal(maxima[:, 0], [1, 2, 1, 2, 3])

@@ -5,16 +5,19 @@ A building has the norm ``w² = v² + 2 e u v + omega² u²``, with its displace
 rests. With ``e = xi omega`` the root w falls like ``exp(-e t)`` in free vibration, and rises by the
 integral of the size of its force per unit mass at most.
 
-Linear buildings without a gap between them are a *group*, with the norm ``W² = sum m w²`` and one e
-for all, the smallest ``xi omega``. A contact force F between neighbours, an impulse too, changes
-the product ``e sum m u v`` by ``e F (u_right - u_left) = 0``, and never adds kinetic energy. So W
-rises by the integral of the size of the ground acceleration times the root of ``sum m q²`` at most,
-with participations q, and falls like ``exp(-e t)``; the rate of a building of larger ``xi omega``
-leaves ``2 e`` by ``e² (xi omega - e) / (omega² - e²)`` of W² at most.
+Buildings without a gap between them that rest in one place are a *group*, with the norm
+``W² = sum m w²`` and one e for all, the smallest ``xi omega``. A contact force F between
+neighbours, an impulse too, changes the product ``e sum m u v`` by ``e F (u_right - u_left) = 0``,
+and never adds kinetic energy. So W rises by the integral of the size of the ground acceleration
+times the root of ``sum m q²`` at most, with participations q, and falls like ``exp(-e t)``; the
+rate of a building of larger ``xi omega`` leaves ``2 e`` by ``e² (xi omega - e) / (omega² - e²)`` of
+W² at most.
 
 Groups are followed as if they did not touch each other. That holds as long as the displacements on
-both sides of a gap together stay below it. Equal linear buildings that have the same state move as
-one without any contact force: they are followed as one, and there is no impact between them.
+both sides of a gap together stay below it. Equal buildings that have the same state move as one
+without any contact force: they are followed as one, and there is no impact between them.
+
+A building that may yield is linear about where it rests as long as it stays in its elastic range.
 """
 
 import math
@@ -114,7 +117,7 @@ def _last_of_group(row, first):
     """Return the last building of the group that begins with the first."""
     last = first
     while last < row.shape[0] - 1 and row[last, GAP] == 0.0:
-        if row[last, YIELD] < math.inf or row[last + 1, YIELD] < math.inf:
+        if _centre(row, last + 1) != _centre(row, first):
             break
         last += 1
     return last
@@ -128,11 +131,10 @@ def _centre(row, i):
 
 @lean
 def _moves_as_one(row, first, last):
-    """Return whether linear buildings have the same equation and the same state."""
+    """Return whether buildings have the same equation and the same state."""
     is_one = True
     for i in range(first + 1, last + 1):
-        is_one &= (row[first, YIELD] == math.inf) & (row[i, YIELD] == math.inf)
-        for column in (STIFFNESS, DAMPING_RATE, PARTICIPATION, U, V):
+        for column in (STIFFNESS, DAMPING_RATE, PARTICIPATION, YIELD, HARDENING, PLASTIC, U, V):
             is_one &= row[i, column] == row[first, column]
     return is_one
 

@@ -46,6 +46,8 @@ def random_rows(rng, sizes):
         restitution=rng.uniform(0.2, 0.9, count),
         azimuth=rng.uniform(0.0, 360.0, len(sizes)),
     )
+    # some yield, some do not by far
+    rows.yield_displacement[: count // 2] = rng.choice([0.02, 0.05, 5.0, np.inf], count // 2)
     # all buildings of the last row are equal
     last = slice(first[-2], first[-1])
     for name in ("period", "damping", "mass", "participation_left", "participation_right"):
@@ -171,12 +173,25 @@ def test_equal_buildings_with_equal_states_have_no_impact():
             assert not is_still(row)
 
 
-@pytest.mark.parametrize(("column", "value"), [(columns.YIELD, 0.1), (columns.MASS, np.inf)])
-def test_yielding_buildings_and_walls_that_touch_have_no_bound(column, value):
+def test_walls_that_touch_have_no_bound():
     # catches: an energy that a wall can give again and again
     row = row_of(1e-5, (0.0, 0.0))
-    row[2, column] = value
+    row[2, columns.MASS] = np.inf
     assert not is_still(row)
+
+
+def test_touching_buildings_that_may_yield_are_linear_about_one_place_of_rest():
+    # catches: a bound beyond the elastic range, or of buildings that press each other at rest
+    def with_yield(displacement, plastic, limit):
+        row = row_of(displacement, (0.0, 0.0))
+        row[:, columns.YIELD], row[:, columns.PLASTIC] = limit, plastic
+        return is_still(row)
+
+    assert with_yield(1e-5, 0.0, 0.02)
+    assert with_yield(2e-3 + 1e-5, 2e-3, 0.02)
+    assert not with_yield(1e-5, 0.0, 1e-5)
+    assert not with_yield(1e-5, 2e-3, 0.02)
+    assert not with_yield([2e-3, 1e-3, 1e-3], [2e-3, 1e-3, 1e-3], 0.02)
 
 
 @pytest.mark.parametrize("damping", [0.04, 0.3])
