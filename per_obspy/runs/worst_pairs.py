@@ -6,7 +6,8 @@ They are computed once, after the screening, and kept in ``worst_pairs.json``.
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
@@ -25,7 +26,7 @@ from per_obspy.pounding.structure import Structure
 from per_obspy.report.results import Drawings
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import GroundFiles, read_ground, read_station_once
-from per_obspy.runs.tasks.parallel import Workers, called
+from per_obspy.runs.tasks.parallel import Workers, begun, near
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
@@ -42,9 +43,6 @@ SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
 #: Pairs whose sensitivity is computed, 0.06 s each: the worst ones, and those whose probability is
 #: nearest to a half, of which a better input may turn the verdict.
 WORST, DOUBTFUL = 100, 50
-
-#: Pairs with sensitivities from which on other processes share the work.
-MANY = 40
 
 #: Stations whose record is drawn, those that serve most pairs: 5 kB each.
 STATIONS = 40
@@ -86,15 +84,16 @@ def read_drawings(path: Path) -> Drawings:
     )
 
 
+@contextmanager
 def page_drawings(
     settings: Run,
     worst: pd.DataFrame,
     stations: Sequence[FinishedStation],
     ground: GroundFiles,
     workers: Workers,
-) -> Drawings:
+) -> Iterator[Callable[[], Drawings]]:
     """
-    Return records and spectra of stations, and histories and sensitivities of pairs.
+    Begin records and spectra of stations, and histories and sensitivities of pairs.
 
     Parameters
     ----------
@@ -107,30 +106,47 @@ def page_drawings(
     ground : GroundFiles
         The ground motion of the run.
     workers : Workers
-        Who computes histories and sensitivities.
+        Who computes them while the block does something else.
+
+    Yields
+    ------
+    callable
+        Returns the drawings as soon as all are done.
     """
-    radii, followed = _radii(stations), _histories(worst, stations)
+    chosen, counts = _with_sensitivity(worst)
+    workers = near(workers, len(chosen))
+    # One share of the sensitivities per worker, which take longest, station by station
+    by_station = chosen.sort_values("station", kind="stable") if len(chosen) else chosen
+    edges = np.linspace(0, len(chosen), workers.count + 1).astype(int)
+    varied = [
+        partial(_sensitivities, by_station.iloc[first:end], ground, settings)
+        for first, end in pairwise(edges)
+        if end > first
+    ]
+    followed = _histories(worst, stations)
+    drawn = _station_drawings(worst, stations) if sum(counts) else {}
+    calls: list[partial[Any]] = [*varied, *followed, *drawn.values()]
+
+    def finished() -> Drawings:
+        found = [call() for call in waiting]
+        count = len(varied) + len(followed)
+        sensitivity, histories = joined(found[: len(varied)]), joined(found[len(varied) : count])
+        records = dict(zip(drawn, found[count:], strict=True))
+        return Drawings(records, histories, sensitivity, *counts, _radii(stations))
+
+    with begun(calls, workers) as waiting:
+        yield finished
+
+
+def _with_sensitivity(worst: pd.DataFrame) -> tuple[pd.DataFrame, tuple[int, int]]:
+    """Return the pairs that have a sensitivity, the worst and the doubtful, and their numbers."""
     if "probability" not in worst or "derived" not in worst:
-        return Drawings({}, joined(call() for call in followed), radii=radii)
+        return worst[:0], (0, 0)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
-    # For few pairs no process is started, and those of a cluster are far away
-    is_near = workers.executor is None and len(chosen) >= MANY
-    near = workers if is_near else Workers(1)
-    # One share of the sensitivities per worker, which take longest, station by station
-    by_station = chosen.sort_values("station", kind="stable")
-    edges = np.linspace(0, len(chosen), near.count + 1).astype(int)
-    varied = [
-        partial(_sensitivities, by_station.iloc[first:end], ground, settings)
-        for first, end in pairwise(edges)
-    ]
-    found: list[Any] = called([*varied, *followed], near)
-    sensitivity, histories = joined(found[: near.count]), joined(found[near.count :])
-    counts = min(len(known), WORST), len(doubt)
-    drawn = _station_drawings(worst, stations)
-    return Drawings(drawn, histories, sensitivity, *counts, radii)
+    return chosen, (min(len(known), WORST), len(doubt))
 
 
 def joined(parts: Iterable[Mapping[int, Found]]) -> dict[int, Found]:
@@ -329,18 +345,23 @@ QUIET = 0.001
 
 def _station_drawings(
     worst: pd.DataFrame, stations: Sequence[FinishedStation]
-) -> dict[str, dict[str, Any]]:
-    """Return record and spectra of the stations that serve most pairs of the page."""
+) -> dict[str, partial[dict[str, Any]]]:
+    """Return the calls that draw the stations which serve most pairs of the page."""
     served = worst["station"].value_counts() if "station" in worst else pd.Series(dtype=int)
     able = [one for one in stations if one.shard and one.spectra is not None]
     names = {one.station: int(served.get(one.station, 0)) for one in able}
     # Ties by name, so that a page does not depend on the order of the jobs
     able.sort(key=lambda one: (-names[one.station], one.station))
     return {
-        one.station: drawn_station(read_station_once(one.shard, one.hash))
+        one.station: partial(_drawn_station, one.shard, one.hash)
         for one in able[:STATIONS]
         if one.shard is not None
     }
+
+
+def _drawn_station(shard: Path, digest: str) -> dict[str, Any]:
+    """Return record and spectra of a station file."""
+    return drawn_station(read_station_once(shard, digest))
 
 
 def drawn_station(station: xr.Dataset) -> dict[str, Any]:
