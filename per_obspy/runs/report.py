@@ -76,9 +76,11 @@ def explaining(
     if not files:
         yield lambda _: Drawings()
         return
+    # What cannot begin is noted where the others are written
     with ExitStack() as stack:
         finished: Callable[[], Drawings] | None = None
         with begun.tried(path):
+            # Columns of the package only
             with ranked_table(files) as table:
                 names = [name for name in table.schema.names if known_column(name)]
                 worst = table.first(PAGE_PAIRS, names)

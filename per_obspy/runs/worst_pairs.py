@@ -6,12 +6,12 @@ They are computed once, after the screening, and kept in ``worst_pairs.json``.
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -31,8 +31,6 @@ from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
 from per_obspy.screening.values import components, motion_along
-
-Found = TypeVar("Found")
 
 #: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
 HISTORIES = 100
@@ -115,27 +113,16 @@ def page_drawings(
     """
     chosen, counts = _with_sensitivity(worst)
     workers = near(workers, len(chosen))
-    # One share of the sensitivities per worker, which take longest, station by station
-    by_station = chosen.sort_values("station", kind="stable") if len(chosen) else chosen
-    edges = np.linspace(0, len(chosen), workers.count + 1).astype(int)
-    varied = [
-        partial(_sensitivities, by_station.iloc[first:end], ground, settings)
-        for first, end in pairwise(edges)
-        if end > first
+    # Sensitivities take longest
+    calls = [
+        *_varied(chosen, ground, settings, workers.count),
+        *_followed(worst, stations),
+        *(_drawn(worst, stations) if any(counts) else ()),
     ]
-    followed = _histories(worst, stations)
-    drawn = _station_drawings(worst, stations) if sum(counts) else {}
-    calls: list[partial[Any]] = [*varied, *followed, *drawn.values()]
-
-    def finished() -> Drawings:
-        found = [call() for call in waiting]
-        count = len(varied) + len(followed)
-        sensitivity, histories = joined(found[: len(varied)]), joined(found[len(varied) : count])
-        records = dict(zip(drawn, found[count:], strict=True))
-        return Drawings(records, histories, sensitivity, *counts, _radii(stations))
-
     with begun(calls, workers) as waiting:
-        yield finished
+        yield lambda: _joined(waiting)._replace(
+            worst=counts[0], doubtful=counts[1], radii=_radii(stations)
+        )
 
 
 def _with_sensitivity(worst: pd.DataFrame) -> tuple[pd.DataFrame, tuple[int, int]]:
@@ -149,16 +136,34 @@ def _with_sensitivity(worst: pd.DataFrame) -> tuple[pd.DataFrame, tuple[int, int
     return chosen, (min(len(known), WORST), len(doubt))
 
 
-def joined(parts: Iterable[Mapping[int, Found]]) -> dict[int, Found]:
-    """Return what was found of pairs, by their rank."""
-    return dict(sorted(chain.from_iterable(part.items() for part in parts)))
+def _joined(calls: Iterable[Callable[[], Drawings]]) -> Drawings:
+    """Return what some calls draw; pairs in the order of their ranks, whoever drew them."""
+    parts = [call() for call in calls]
+    return Drawings(
+        dict(chain.from_iterable(part.stations.items() for part in parts)),
+        dict(sorted(chain.from_iterable(part.histories.items() for part in parts))),
+        dict(sorted(chain.from_iterable(part.sensitivity.items() for part in parts))),
+    )
 
 
-def _sensitivities(
-    pairs: pd.DataFrame, files: GroundFiles, settings: Run
-) -> dict[int, list[list[Any]]]:
+def _varied(
+    pairs: pd.DataFrame, ground: GroundFiles, settings: Run, shares: int
+) -> list[partial[Drawings]]:
+    """Return the calls that compute the sensitivities of pairs, in shares by station."""
+    if pairs.empty:
+        return []
+    by_station = pairs.sort_values("station", kind="stable")
+    edges = np.linspace(0, len(pairs), shares + 1).astype(int)
+    return [
+        partial(_sensitivities, by_station.iloc[first:end], ground, settings)
+        for first, end in pairwise(edges)
+    ]
+
+
+def _sensitivities(pairs: pd.DataFrame, files: GroundFiles, settings: Run) -> Drawings:
     """Return the sensitivities of pairs by their rank, the largest change first."""
     ranks = dict(zip(pairs["pair_id"], pairs["rank"], strict=True))
+    # One list per pair
     found: dict[int, list[list[Any]]] = {}
     for one in _each(pairs, read_ground(files), settings):
         ends = [float(f"{value:.4g}") for value in (one.low, one.high)]
@@ -168,7 +173,7 @@ def _sensitivities(
     # Input, two values, two probabilities, two states
     for rows in found.values():
         rows.sort(key=lambda row: -abs(row[4] - row[3]))
-    return found
+    return Drawings(sensitivity=found)
 
 
 def _each(pairs: pd.DataFrame, ground: RegionalMotion, settings: Run) -> list[Any]:
@@ -214,17 +219,16 @@ def pair_histories(
     stations : iterable of FinishedStation
         With station files.
     """
-    return joined(call() for call in _histories(worst, stations))
+    return {**_joined(_followed(worst, stations)).histories}
 
 
-def _histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> list[partial[dict[int, dict[str, Any]]]]:
+def _followed(worst: pd.DataFrame, stations: Iterable[FinishedStation]) -> list[partial[Drawings]]:
     """Return the calls that compute the histories of pairs, station by station."""
     if not set(HISTORY_COLUMNS) <= set(worst):
         return []
     usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
     shards = {station.shard.stem: station for station in stations if station.shard}
+    # Motions are large
     calls = []
     for name, pairs in usable.groupby("station", sort=False):
         station = shards.get(file_stem(str(name)))
@@ -234,11 +238,12 @@ def _histories(
     return calls
 
 
-def _histories_at(pairs: pd.DataFrame, shard: Path, digest: str) -> dict[int, dict[str, Any]]:
+def _histories_at(pairs: pd.DataFrame, shard: Path, digest: str) -> Drawings:
     """Return the histories of pairs under the record of one station."""
     motion = read_station_once(shard, digest)
     drawn = {int(pair["rank"]): drawn_history(motion, pair) for _, pair in pairs.iterrows()}
-    return {rank: history for rank, history in drawn.items() if history is not None}
+    known = {rank: history for rank, history in drawn.items() if history is not None}
+    return Drawings(histories=known)
 
 
 def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:
@@ -343,25 +348,23 @@ DIGITS = 3
 QUIET = 0.001
 
 
-def _station_drawings(
-    worst: pd.DataFrame, stations: Sequence[FinishedStation]
-) -> dict[str, partial[dict[str, Any]]]:
+def _drawn(worst: pd.DataFrame, stations: Sequence[FinishedStation]) -> list[partial[Drawings]]:
     """Return the calls that draw the stations which serve most pairs of the page."""
     served = worst["station"].value_counts() if "station" in worst else pd.Series(dtype=int)
     able = [one for one in stations if one.shard and one.spectra is not None]
     names = {one.station: int(served.get(one.station, 0)) for one in able}
     # Ties by name, so that a page does not depend on the order of the jobs
     able.sort(key=lambda one: (-names[one.station], one.station))
-    return {
-        one.station: partial(_drawn_station, one.shard, one.hash)
+    return [
+        partial(_station_drawing, one.station, one.shard, one.hash)
         for one in able[:STATIONS]
         if one.shard is not None
-    }
+    ]
 
 
-def _drawn_station(shard: Path, digest: str) -> dict[str, Any]:
+def _station_drawing(name: str, shard: Path, digest: str) -> Drawings:
     """Return record and spectra of a station file."""
-    return drawn_station(read_station_once(shard, digest))
+    return Drawings({name: drawn_station(read_station_once(shard, digest))})
 
 
 def drawn_station(station: xr.Dataset) -> dict[str, Any]:
