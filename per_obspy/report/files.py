@@ -6,7 +6,7 @@ Page, summary, figures, layers and workbook read one `Results` and nothing else.
 
 import csv
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,7 +41,7 @@ from per_obspy.report.page.map_lines import (
     towns_around,
 )
 from per_obspy.report.pair_figure import DIFFERING, differing_pair, draw_record_to_pair
-from per_obspy.report.results import Results
+from per_obspy.report.results import Drawings, Results
 from per_obspy.report.statements import alert_line
 from per_obspy.report.summary.one_page import write_page as write_summary_page
 from per_obspy.report.summary.spoken_text import write_text
@@ -104,11 +104,6 @@ class Report:
     outputs: list[Path]
     faults: list[str]
     alert: str = ""
-
-    def joined(self, later: "Report") -> "Report":
-        """Return the files and faults of two parts, with the alert of the later one."""
-        files, faults = [*self.outputs, *later.outputs], [*self.faults, *later.faults]
-        return Report(files, faults, later.alert)
 
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
@@ -265,7 +260,17 @@ def outlines_beside(*pairs: Path | None) -> Path | None:
     return None
 
 
-def write_report(results: Results, table: PairTable, folder: Path, report: Report) -> None:
+#: Return what explains the worst pairs as soon as it is known, and note its file.
+Explained = Callable[[Report], Drawings]
+
+
+def write_report(
+    results: Results,
+    table: PairTable,
+    folder: Path,
+    report: Report,
+    explained: Explained | None = None,
+) -> None:
     """
     Write everything that shows the results of a screening; a file that fails leaves the others.
 
@@ -279,6 +284,8 @@ def write_report(results: Results, table: PairTable, folder: Path, report: Repor
         Of the results.
     report : Report
         Takes files, faults and alert.
+    explained : callable, optional
+        Asked for the drawings of the page, which is written last.
 
     Raises
     ------
@@ -290,14 +297,16 @@ def write_report(results: Results, table: PairTable, folder: Path, report: Repor
     if results.stem == "risk":
         observed, simulated = reader.observed, results.region.simulated
         report.outputs.extend(write_evaluation(observed, folder, simulated))
-    # What people open first comes first
     report.alert = alert_line(results)
     write_summaries(results, folder, report)
+    write_lists(results, folder, table.spreadsheet, report)
+    _draw_figures(results, folder, report)
+    # Other processes were at work on what the page shows of single pairs
+    if explained is not None:
+        results = replace(results, drawings=explained(report))
     with report.tried(folder / "report.html"):
         page = with_page_data(results, folder, table.outlines, table.texts, report)
         write_page(page, folder / "report.html")
-    write_lists(results, folder, table.spreadsheet, report)
-    _draw_figures(results, folder, report)
 
 
 def read_table(

@@ -6,7 +6,8 @@ from; everything after that is :func:`per_obspy.report.files.write_report`.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +21,7 @@ from per_obspy.config import Design, Ensemble, Run, Totals
 from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.errors import CatalogError
 from per_obspy.report.files import (
+    Explained,
     PairTable,
     Report,
     needed_columns,
@@ -60,24 +62,46 @@ from per_obspy.spectra.storage import region as joined_spectra
 from per_obspy.spectra.storage import write_spectra
 
 
-def explained(
+@contextmanager
+def explaining(
     context: RunContext, stations: Sequence[FinishedStation], ground: GroundFiles
-) -> Report:
-    """Write histories and sensitivity of the worst pairs of a run; none without a risk table."""
-    folder, report = context.folder, Report([], [])
-    # A fault leaves the page without them
-    if files := table_files(folder):
-        with report.tried(folder / WORST_PAIRS):
+) -> Iterator[Explained]:
+    """
+    Begin histories and sensitivity of the worst pairs of a run in other processes.
+
+    The block receives the function that waits for them, writes them and returns them; a fault
+    leaves the page without them. None without a risk table.
+    """
+    path, files, begun = context.folder / WORST_PAIRS, table_files(context.folder), Report([], [])
+    if not files:
+        yield lambda _: Drawings()
+        return
+    # What cannot begin is noted where the others are written
+    with ExitStack() as stack:
+        finished: Callable[[], Drawings] | None = None
+        with begun.tried(path):
+            # Columns of the package only
             with ranked_table(files) as table:
                 names = [name for name in table.schema.names if known_column(name)]
                 worst = table.first(PAGE_PAIRS, names)
             drawings = page_drawings(context.settings, worst, stations, ground, context.workers)
-            write_drawings(drawings, folder / WORST_PAIRS)
-    return report
+            finished = stack.enter_context(drawings)
+
+        def written(report: Report) -> Drawings:
+            report.faults += begun.faults
+            if finished is not None:
+                with report.tried(path):
+                    write_drawings(finished(), path)
+            return read_drawings(path)
+
+        yield written
 
 
 def reported(
-    context: RunContext, stations: Sequence[FinishedStation], coverage: Coverage
+    context: RunContext,
+    stations: Sequence[FinishedStation],
+    coverage: Coverage,
+    explained: Explained | None = None,
 ) -> Report:
     """
     Write the report of the results in the output folder.
@@ -92,6 +116,8 @@ def reported(
         With station files.
     coverage : Coverage
         Rows of the pair tables, and those that are left out.
+    explained : callable, optional
+        From :func:`explaining`; otherwise what an earlier run has written explains the worst pairs.
     """
     settings, folder = context.settings, context.folder
     # Spectra of all stations, as far as there are any
@@ -105,7 +131,7 @@ def reported(
     # Without a pair there is no risk table
     if table_files(folder):
         results = _results_of_run(settings, folder, stations, coverage, spectra)
-        _report_pairs(settings, folder, stations, results, report)
+        _report_pairs(settings, folder, stations, results, report, explained)
     context.progress("report", 1, 1)
     return report
 
@@ -167,6 +193,7 @@ def _report_pairs(
     stations: Sequence[FinishedStation],
     results: Results,
     report: Report,
+    explained: Explained | None,
 ) -> None:
     """Write everything that shows the pairs of a run."""
     is_whole = settings.geopackage or settings.spreadsheet
@@ -179,7 +206,7 @@ def _report_pairs(
         worst = worst_pairs(table, settings.totals)
         pairs = _pair_table(settings, table.pieces(), table.pairs, settings.totals, outlines)
         results = replace(results, worst=worst, record=_record(worst, stations))
-        write_report(results, pairs, folder, report)
+        write_report(results, pairs, folder, report, explained)
     if settings.pmtiles:
         _write_tiles(folder / "risk.gpkg", report)
 

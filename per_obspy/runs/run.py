@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError
 from per_obspy.progress import Progress, silent
-from per_obspy.results.ranked_table import table_outputs
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
 from per_obspy.runs.output_folder import (
     RECORD,
@@ -191,6 +190,8 @@ def _finished(file: Path) -> dict[str, Any]:
         raise CatalogError(str(file), "no finished run here: run `per-obspy run` first") from error
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
+    from per_obspy.results.ranked_table import table_outputs
+
     # Other results are written again
     others = {
         name: one for name, one in record["outputs"].items() if name in ("spectra.nc", WORST_PAIRS)

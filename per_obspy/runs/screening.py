@@ -227,14 +227,7 @@ def _parts(context: RunContext, ground: GroundFiles) -> tuple[list[Part], PairNo
     # Rows are counted as chunks are finished, in whichever order
     parts, rows, raw = list[Part](), 0, dict[int, RawRows]()
     tally = CoverageTally(search_of_tables(inventory.rows))
-    size = _chunk_rows(inventory.count, context.workers.count)
-    shares = _shares(context)
-    chunks = enumerate(inventory.chunks(size))
-    pieces = (
-        (shares * number + place, share)
-        for number, chunk in chunks
-        for place, share in enumerate(_shared(chunk, ground, shares))
-    )
+    pieces = _pieces(inventory, ground, context)
     tasks = _tasks(settings, folder, ground, pieces, raw)
     for part in finish(tasks, context.workers):
         parts.append(part)
@@ -284,6 +277,16 @@ def _shares(context: RunContext) -> int:
     return context.workers.count if context.settings.screening.exact else 1
 
 
+def _pieces(
+    inventory: PairInventory, ground: GroundFiles, context: RunContext
+) -> Iterator[tuple[int, PairChunk]]:
+    """Yield the shares of all chunks with their numbers."""
+    size, shares = _chunk_rows(inventory.count, context.workers.count), _shares(context)
+    for number, chunk in enumerate(inventory.chunks(size)):
+        for place, share in enumerate(_shared(chunk, ground, shares)):
+            yield shares * number + place, share
+
+
 def _shared(chunk: PairChunk, ground: GroundFiles, most: int) -> list[PairChunk]:
     """Return a chunk in shares of about as many rows, of which each has most stations alone."""
     count = min(most, len(chunk.repeated) // SMALLEST_SHARE)
@@ -295,6 +298,7 @@ def _shared(chunk: PairChunk, ground: GroundFiles, most: int) -> list[PairChunk]
     nearest, _ = nearest_station(*np.nan_to_num(place), *stations)
     shares = []
     for number, rows in enumerate(np.array_split(np.argsort(nearest, kind="stable"), count)):
+        # In the order of the file, whose broken lines belong to the first share
         rows.sort()
         raw = chunk.rows
         raw = raw._replace(

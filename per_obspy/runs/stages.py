@@ -30,7 +30,7 @@ from per_obspy.runs.output_folder import (
 from per_obspy.runs.pairs import check_inputs
 from per_obspy.runs.provenance import RunContext, RunSettings
 from per_obspy.runs.record import KnownStations, RunRecord, earlier_facts, station_facts
-from per_obspy.runs.report import explained, reported
+from per_obspy.runs.report import explaining, reported
 from per_obspy.runs.screening import Screened, screened
 from per_obspy.runs.stations import (
     all_rejections,
@@ -177,10 +177,12 @@ def _later_stages(
         found = screened(context, usable, rejected)
         spectra = _spectra(usable)
         table = write_stations(spectra, found.left_out, found.served.pairs, folder, found.alone)
-        worst = explained(context, usable, found.ground)
     # Everything that is read from them
-    with timed(record.seconds, "report"):
-        report = worst.joined(reported(context, usable, found.coverage))
+    with (
+        timed(record.seconds, "report"),
+        explaining(context, usable, found.ground) as explained,
+    ):
+        report = reported(context, usable, found.coverage, explained)
     record = _with_counts(record, settings, found, stations, known)
     return replace(
         record,

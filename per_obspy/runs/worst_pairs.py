@@ -6,11 +6,12 @@ They are computed once, after the screening, and kept in ``worst_pairs.json``.
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,13 +26,11 @@ from per_obspy.pounding.structure import Structure
 from per_obspy.report.results import Drawings
 from per_obspy.runs.stations import file_stem
 from per_obspy.runs.tasks.ground_files import GroundFiles, read_ground, read_station_once
-from per_obspy.runs.tasks.parallel import Workers, called
+from per_obspy.runs.tasks.parallel import Workers, begun, near
 from per_obspy.runs.tasks.station import FinishedStation
 from per_obspy.screening.sensitivity import input_sensitivity
 from per_obspy.screening.site_motion import RegionalMotion
 from per_obspy.screening.values import components, motion_along
-
-Found = TypeVar("Found")
 
 #: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
 HISTORIES = 100
@@ -42,9 +41,6 @@ SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
 #: Pairs whose sensitivity is computed, 0.06 s each: the worst ones, and those whose probability is
 #: nearest to a half, of which a better input may turn the verdict.
 WORST, DOUBTFUL = 100, 50
-
-#: Pairs with sensitivities from which on other processes share the work.
-MANY = 40
 
 #: Stations whose record is drawn, those that serve most pairs: 5 kB each.
 STATIONS = 40
@@ -86,15 +82,16 @@ def read_drawings(path: Path) -> Drawings:
     )
 
 
+@contextmanager
 def page_drawings(
     settings: Run,
     worst: pd.DataFrame,
     stations: Sequence[FinishedStation],
     ground: GroundFiles,
     workers: Workers,
-) -> Drawings:
+) -> Iterator[Callable[[], Drawings]]:
     """
-    Return records and spectra of stations, and histories and sensitivities of pairs.
+    Begin records and spectra of stations, and histories and sensitivities of pairs.
 
     Parameters
     ----------
@@ -107,42 +104,66 @@ def page_drawings(
     ground : GroundFiles
         The ground motion of the run.
     workers : Workers
-        Who computes histories and sensitivities.
+        Who computes them while the block does something else.
+
+    Yields
+    ------
+    callable
+        Returns the drawings as soon as all are done.
     """
-    radii, followed = _radii(stations), _histories(worst, stations)
+    chosen, counts = _with_sensitivity(worst)
+    workers = near(workers, len(chosen))
+    # Sensitivities take longest
+    calls = [
+        *_varied(chosen, ground, settings, workers.count),
+        *_followed(worst, stations),
+        *(_drawn(worst, stations) if any(counts) else ()),
+    ]
+    with begun(calls, workers) as waiting:
+        yield lambda: _joined(waiting)._replace(
+            worst=counts[0], doubtful=counts[1], radii=_radii(stations)
+        )
+
+
+def _with_sensitivity(worst: pd.DataFrame) -> tuple[pd.DataFrame, tuple[int, int]]:
+    """Return the pairs that have a sensitivity, the worst and the doubtful, and their numbers."""
     if "probability" not in worst or "derived" not in worst:
-        return Drawings({}, joined(call() for call in followed), radii=radii)
+        return worst[:0], (0, 0)
     known = worst[worst["probability"].notna()]
     # Pairs whose outcome is certain whatever their inputs are stay in the count
     doubt = (known["probability"] - 0.5).abs().iloc[WORST:].nsmallest(DOUBTFUL)
     chosen = pd.concat([known.head(WORST), known.loc[doubt.index]])
-    # For few pairs no process is started, and those of a cluster are far away
-    is_near = workers.executor is None and len(chosen) >= MANY
-    near = workers if is_near else Workers(1)
-    # One share of the sensitivities per worker, which take longest, station by station
-    by_station = chosen.sort_values("station", kind="stable")
-    edges = np.linspace(0, len(chosen), near.count + 1).astype(int)
-    varied = [
+    return chosen, (min(len(known), WORST), len(doubt))
+
+
+def _joined(calls: Iterable[Callable[[], Drawings]]) -> Drawings:
+    """Return what some calls draw; pairs in the order of their ranks, whoever drew them."""
+    parts = [call() for call in calls]
+    return Drawings(
+        dict(chain.from_iterable(part.stations.items() for part in parts)),
+        dict(sorted(chain.from_iterable(part.histories.items() for part in parts))),
+        dict(sorted(chain.from_iterable(part.sensitivity.items() for part in parts))),
+    )
+
+
+def _varied(
+    pairs: pd.DataFrame, ground: GroundFiles, settings: Run, shares: int
+) -> list[partial[Drawings]]:
+    """Return the calls that compute the sensitivities of pairs, in shares by station."""
+    if pairs.empty:
+        return []
+    by_station = pairs.sort_values("station", kind="stable")
+    edges = np.linspace(0, len(pairs), shares + 1).astype(int)
+    return [
         partial(_sensitivities, by_station.iloc[first:end], ground, settings)
         for first, end in pairwise(edges)
     ]
-    found: list[Any] = called([*varied, *followed], near)
-    sensitivity, histories = joined(found[: near.count]), joined(found[near.count :])
-    counts = min(len(known), WORST), len(doubt)
-    drawn = _station_drawings(worst, stations)
-    return Drawings(drawn, histories, sensitivity, *counts, radii)
 
 
-def joined(parts: Iterable[Mapping[int, Found]]) -> dict[int, Found]:
-    """Return what was found of pairs, by their rank."""
-    return dict(sorted(chain.from_iterable(part.items() for part in parts)))
-
-
-def _sensitivities(
-    pairs: pd.DataFrame, files: GroundFiles, settings: Run
-) -> dict[int, list[list[Any]]]:
+def _sensitivities(pairs: pd.DataFrame, files: GroundFiles, settings: Run) -> Drawings:
     """Return the sensitivities of pairs by their rank, the largest change first."""
     ranks = dict(zip(pairs["pair_id"], pairs["rank"], strict=True))
+    # One list per pair
     found: dict[int, list[list[Any]]] = {}
     for one in _each(pairs, read_ground(files), settings):
         ends = [float(f"{value:.4g}") for value in (one.low, one.high)]
@@ -152,7 +173,7 @@ def _sensitivities(
     # Input, two values, two probabilities, two states
     for rows in found.values():
         rows.sort(key=lambda row: -abs(row[4] - row[3]))
-    return found
+    return Drawings(sensitivity=found)
 
 
 def _each(pairs: pd.DataFrame, ground: RegionalMotion, settings: Run) -> list[Any]:
@@ -198,17 +219,16 @@ def pair_histories(
     stations : iterable of FinishedStation
         With station files.
     """
-    return joined(call() for call in _histories(worst, stations))
+    return {**_joined(_followed(worst, stations)).histories}
 
 
-def _histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> list[partial[dict[int, dict[str, Any]]]]:
+def _followed(worst: pd.DataFrame, stations: Iterable[FinishedStation]) -> list[partial[Drawings]]:
     """Return the calls that compute the histories of pairs, station by station."""
     if not set(HISTORY_COLUMNS) <= set(worst):
         return []
     usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
     shards = {station.shard.stem: station for station in stations if station.shard}
+    # Motions are large
     calls = []
     for name, pairs in usable.groupby("station", sort=False):
         station = shards.get(file_stem(str(name)))
@@ -218,11 +238,12 @@ def _histories(
     return calls
 
 
-def _histories_at(pairs: pd.DataFrame, shard: Path, digest: str) -> dict[int, dict[str, Any]]:
+def _histories_at(pairs: pd.DataFrame, shard: Path, digest: str) -> Drawings:
     """Return the histories of pairs under the record of one station."""
     motion = read_station_once(shard, digest)
     drawn = {int(pair["rank"]): drawn_history(motion, pair) for _, pair in pairs.iterrows()}
-    return {rank: history for rank, history in drawn.items() if history is not None}
+    known = {rank: history for rank, history in drawn.items() if history is not None}
+    return Drawings(histories=known)
 
 
 def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:
@@ -327,20 +348,23 @@ DIGITS = 3
 QUIET = 0.001
 
 
-def _station_drawings(
-    worst: pd.DataFrame, stations: Sequence[FinishedStation]
-) -> dict[str, dict[str, Any]]:
-    """Return record and spectra of the stations that serve most pairs of the page."""
+def _drawn(worst: pd.DataFrame, stations: Sequence[FinishedStation]) -> list[partial[Drawings]]:
+    """Return the calls that draw the stations which serve most pairs of the page."""
     served = worst["station"].value_counts() if "station" in worst else pd.Series(dtype=int)
     able = [one for one in stations if one.shard and one.spectra is not None]
     names = {one.station: int(served.get(one.station, 0)) for one in able}
     # Ties by name, so that a page does not depend on the order of the jobs
     able.sort(key=lambda one: (-names[one.station], one.station))
-    return {
-        one.station: drawn_station(read_station_once(one.shard, one.hash))
+    return [
+        partial(_station_drawing, one.station, one.shard, one.hash)
         for one in able[:STATIONS]
         if one.shard is not None
-    }
+    ]
+
+
+def _station_drawing(name: str, shard: Path, digest: str) -> Drawings:
+    """Return record and spectra of a station file."""
+    return Drawings({name: drawn_station(read_station_once(shard, digest))})
 
 
 def drawn_station(station: xr.Dataset) -> dict[str, Any]:

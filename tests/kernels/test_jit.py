@@ -48,6 +48,22 @@ def test_kernels_release_the_interpreter_and_are_stored(decorator):
     assert double.stats.cache_path is not None
 
 
+@pytest.mark.compiled
+def test_stored_kernels_are_loaded_without_a_call(monkeypatch):
+    # would catch a server that loads nothing, so that each of its workers does so again
+    def triple(value):
+        return 3.0 * value
+
+    assert _jit.kernel(triple)(1.5) == 4.5
+    again, never = _jit.kernel(triple), _jit.kernel(lambda value: 4.0 * value)
+    monkeypatch.setattr(_jit, "_kernels", [again.kernel, never.kernel])
+    assert _jit.are_stored(again)
+    assert not _jit.are_stored(again, never)
+    _jit.load_stored()
+    assert list(again.kernel.stats.cache_hits.values()) == [1]
+    assert not never.kernel.overloads
+
+
 def test_sums_keep_their_order():
     # would catch: reassociation, after which a result depends on the length of a vector
     @_jit.kernel

@@ -20,12 +20,18 @@ def test_every_pair_is_judged(monkeypatch):
 def test_the_first_dataset_is_made_before_the_thread(monkeypatch):
     # would catch two threads importing Dask at once, which ended a run where Dask is installed
     threads = []
+    monkeypatch.setattr(warmup, "are_stored", lambda *_: False)
     monkeypatch.setattr(warmup, "_station", lambda: threads.append(current_thread()))
     monkeypatch.setattr(warmup, "compile_screening", lambda: threads.append(current_thread()))
     with warmup.compiling(lambda *_: None):
         pass
     assert threads[0] is main_thread()
     assert threads[1] is not main_thread()
+    # workers load what is stored: loading it here as well took half a second of one of two cores
+    monkeypatch.setattr(warmup, "are_stored", lambda *_: True)
+    with warmup.compiling(lambda *_: None):
+        pass
+    assert len(threads) == 2
 
 
 @pytest.mark.parametrize("name", sorted(warmup.PARTS))

@@ -39,7 +39,7 @@ from typing import Any, Generic, NamedTuple, Self, TypeVar
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError, WrongOutput
 from per_obspy.machine import machine_fault, machine_faults
 from per_obspy.progress import Progress, silent
-from per_obspy.runs.tasks.worker_start import start_server, worker_context
+from per_obspy.runs.tasks.worker_start import are_forks, start_server, worker_context
 from per_obspy.termination import held
 from per_obspy.threads import usable_processors, use_one_thread
 
@@ -112,6 +112,9 @@ DIED = "its worker process was killed, perhaps for lack of memory"
 #: Signals that end a run.
 _SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
+#: Pairs from which on short work after the screening is begun in other processes.
+MANY = 40
+
 #: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
 
@@ -180,33 +183,45 @@ def _all_results(
             yield from _alone(task, watched)
 
 
-def called(calls: Sequence[Callable[[], Result]], workers: Workers) -> list[Result]:
+def near(workers: Workers, pairs: int) -> Workers:
+    """Return who does short work on so many pairs: this process where others begin too late."""
+    shared = pairs >= MANY and workers.executor is None and are_forks()
+    return workers if shared else Workers(1)
+
+
+@contextmanager
+def begun(calls: Sequence[partial[Result]], workers: Workers) -> Iterator[list[partial[Result]]]:
     """
-    Return the results of some calls, in their order; an error of one is an error of all.
+    Begin some calls in other processes; the block receives calls that wait for the results.
 
-    Other processes must be able to load the calls, such as those of ``functools.partial``.
-
-    Raises
-    ------
-    RuntimeError
-        If a call fails.
-    Unfinished
-        If the machine failed in a call.
+    A call whose process dies is done by this one.
     """
-    found = dict(results(enumerate(calls), Work(_numbered, _raised), workers))
-    return [found[number] for number in range(len(calls))]
+    if workers.count < 2:
+        yield [*calls]
+        return
+    with _Pool(workers.count) as pool:
+        yield [partial(_awaited, _submitted(pool, call), call) for call in calls]
 
 
-def _numbered(task: tuple[int, Callable[[], Result]]) -> tuple[int, Result]:
-    """Return the result of a call with its number."""
-    number, call = task
-    return number, call()
+def _submitted(pool: Executor, call: partial[Result]) -> Future[Result] | None:
+    """Return the future of a call; None if the pool is broken."""
+    try:
+        return pool.submit(_done, _call, call)
+    except BrokenExecutor:
+        return None
 
 
-def _raised(task: object, reason: str) -> Any:
-    """Raise an error with the reason why a call failed."""
-    del task
-    raise RuntimeError(reason)
+def _awaited(future: Future[Result] | None, call: partial[Result]) -> Result:
+    """Return the result of a call that was begun, or else do it."""
+    try:
+        return future.result() if future else call()
+    except BrokenExecutor:
+        return call()
+
+
+def _call(call: partial[Result]) -> Result:
+    """Call; other processes load this by its name."""
+    return call()
 
 
 def prepare_workers(workers: int) -> None:

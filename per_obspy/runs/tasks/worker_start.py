@@ -41,15 +41,20 @@ def loading() -> Iterator[None]:
     """Load libraries in a block; those of a program are left out of later searches for garbage."""
     with no_search():
         yield
-    if _forks["workers"]:
+    if are_forks():
         keep_all()
+
+
+def are_forks() -> bool:
+    """Return whether workers are forks of a server, which begin in a tenth of a second."""
+    return _forks["workers"]
 
 
 def worker_context() -> "BaseContext":
     """Return the context in which worker processes are started."""
     from multiprocessing import forkserver, get_context
 
-    if not _forks["workers"]:
+    if not are_forks():
         return get_context("spawn")
     forkserver.set_forkserver_preload(list(LOADED))
     return get_context("forkserver")
@@ -59,6 +64,6 @@ def start_server() -> None:
     """Start the server, if workers are its forks, which loads its libraries in the background."""
     from multiprocessing import forkserver
 
-    if _forks["workers"]:
+    if are_forks():
         worker_context()
         forkserver.ensure_running()

@@ -5,13 +5,14 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 from math import isqrt
 from pathlib import Path
 
 import pytest
 
 from per_obspy.errors import CatalogError, Unfinished, WriteError
-from per_obspy.runs.tasks.parallel import AHEAD, DIED, Work, Workers, results
+from per_obspy.runs.tasks.parallel import AHEAD, DIED, Work, Workers, begun, results
 
 #: Ends a process as the system does with one that takes too much memory.
 DIES = "__import__('os')._exit(9)"
@@ -74,6 +75,16 @@ def test_a_worker_that_dies_takes_only_its_task_with_it():
     assert unfinished.value.faults == (f"{DIES}: {DIED}",)
     numbers.remove(3)
     assert sorted(found) == numbers
+
+
+def test_calls_are_begun_in_other_processes_and_none_is_lost():
+    # would catch a killed process that leaves the page without what all others have found
+    here = f"__import__('os').getpid() == {os.getpid()}"
+    with begun([partial(eval, here)] * 3, Workers(2)) as waiting:
+        assert [call() for call in waiting] == [False] * 3
+    calls = [partial(eval, f"{here} or {DIES}"), partial(isqrt, 16), partial(isqrt, 25)]
+    with begun(calls, Workers(2)) as waiting:
+        assert [call() for call in waiting] == [True, 4, 5]
 
 
 SLEEPS = """
