@@ -5,58 +5,94 @@ The yielding part of the spring is an input: with the plastic displacement p a s
 hardening alpha is the linear one under the acceleration ``a - (1 - alpha) omega² p``, whose step is
 exact where both are linear between samples. In a step p grows by what its elastic displacement
 ``u - p`` at the end has beyond the yield displacement, over the part of a change of p that u does
-not follow. So every structure, elastic or not, is the same arithmetic in every step. Where yielding
-begins or ends between two samples p bends; the error is of second order in the step.
+not follow. Where yielding begins or ends between two samples p bends; the error is of second order
+in the step.
 
-The end of a record is too weak to raise a maximum. From rest it moves a structure by at most ``a q
-X / omega²``, a being the largest acceleration that is left and X the integral of the impulse
+Most of the time nothing yields and nothing counts. A round of steps is first taken in strides, in
+which p stays, about the displacement at rest: three moments of the acceleration move a structure
+over a stride of any number of steps. Only pairs that come near a yield displacement or a maximum at
+the ends of the strides take the round again, step by step.
+
+The begin and the end of a record are too weak to count. From rest an acceleration of at most a
+moves a structure by ``a q X / omega²`` at most, X being the integral of the size of the impulse
 response, ``2 / (1 - rho)`` at most, where rho is the ratio of two peaks of free vibration in
-succession. Beside the motion that is there this shows the step from which nothing can exceed the
-maxima so far. What a pair shares a block with changes no bit of it.
+succession. A pair rests until it may yield, or exceed a small part of what the largest acceleration
+may do, less the time in which it forgets; one that does not reach this part runs again, from what
+it has reached. Beside the motion that is there the bound shows the round from which nothing can
+exceed the maxima so far.
+
+Single precision doubles the lanes of a vector. What a pair shares a block with changes no bit.
 """
+
+import math
 
 import numpy as np
 
-from per_obspy.kernels._aligned import aligned_line
+from per_obspy.kernels._aligned import aligned_single_line
 from per_obspy.kernels._jit import inlined, kernel, lean, vectorised
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
-from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE
 
 #: Pairs next to each other: a constant trip count, which the compiler turns into vectors.
 LANES = 32
-#: Steps of a round, before which is checked whether a maximum can still be raised.
-CHECKED_STEPS = 64
+#: Steps of a round, a multiple of two strides; rounds after which the end is looked for.
+ROUND, CHECKED_ROUNDS = 48, 4
 
+#: Part of a yield displacement or of a maximum that the ends of strides reach where the motion
+#: between them reaches all of it. A vibration exceeds them by 1 / cos(theta / 2), theta being the
+#: angle of a stride.
+NEAR = np.float32(0.86)
+#: Part of what the largest acceleration may do that a pair is expected to reach: the bound is wide.
+EXPECTED = 0.001
+#: Largest remainder of the motion before a start, over the bound of what counts.
+FORGOTTEN = 1e-3
+#: Bounds of what may still come grow by this, beside which rounding does not matter.
+ROUNDING = 1.00001
 #: Displacement of an undamped structure by a small acceleration: 0 without any.
-UNBOUNDED = 1e100
+UNBOUNDED = 1e30
+
+#: Numbers of single precision: zero, one, and one below all displacements.
+NOTHING, ONE, LOWEST = np.float32(0.0), np.float32(1.0), np.float32(-UNBOUNDED)
+#: States below this are set to zero: denormal numbers are slow.
+SMALLEST_STATE = np.float32(1e-30)
 
 #: Rows of a structure in a block, one column per pair: displacement, velocity over omega, plastic
-#: displacement; what a step makes of these and of the acceleration at its start and its end, of
-#: displacement and of velocity; what a change of p adds to both; yield displacement; growth of p
-#: over what is beyond it; omega; hardening; largest displacement by an acceleration of 1. After
-#: both structures: the direction, and the largest relative displacement and velocity.
-STRUCTURE, DIRECTION, ROWS = 20, 40, 44
+#: displacement; what a step adds to the first two by these and by the acceleration at its start and
+#: its end; what a change of p adds to both; yield displacement; growth of p over what is beyond it;
+#: omega; displacement at rest and largest one, by a plastic displacement and an acceleration of 1.
+#: Of strides: p before the round; what a stride makes of displacement from rest and velocity over
+#: omega, and of three moments; both now; largest and least displacement from rest in the round.
+#: After both structures: the direction; largest relative displacement and velocity before the
+#: round, in steps and in strides; what they need not reach; whether the round counts step by step;
+#: first round.
+STRUCTURE, DIRECTION, ROWS = 35, 70, 82
 U, Z, P = (row * LANES for row in range(3))
 UU, UZ, UP, U0, U1, ZU, ZZ, ZP, Z0, Z1 = (row * LANES for row in range(3, 13))
-UD, ZD, LIMIT, GROWTH, OMEGA, HARDENING, REACH = (row * LANES for row in range(13, 20))
+UD, ZD, LIMIT, GROWTH, OMEGA, RESTING, REACH = (row * LANES for row in range(13, 20))
+BEFORE, WW, WY, W0, W1, W2, YW, YY, Y0, Y1, Y2 = (row * LANES for row in range(20, 31))
+W, Y, MOST, LEAST = (row * LANES for row in range(31, STRUCTURE))
 SECOND = STRUCTURE * LANES
-NORTH, EAST, DISTANCE, SPEED = (row * LANES for row in range(DIRECTION, ROWS))
+NORTH, EAST, DISTANCE, SPEED, DISTANCE_BY_STEP, SPEED_BY_STEP = (
+    row * LANES for row in range(DIRECTION, DIRECTION + 6)
+)
+DISTANCE_BY_STRIDE, SPEED_BY_STRIDE, DISTANCE_FLOOR, SPEED_FLOOR, BY_STEP, START = (
+    row * LANES for row in range(DIRECTION + 6, ROWS)
+)
 
 
 @kernel
-def yielding_approach(north, east, dt, strongest, pairs, largest):
+def yielding_approach(north, east, dt, stride, pairs, largest):
     """
     Fill the largest relative displacements and velocities of pairs that may yield, at the samples.
 
     Parameters
     ----------
-    north, east : (n_samples,) ndarray
+    north, east : (n_rounds * ROUND + 1,) ndarray
         Components of the ground acceleration, m/s², and zeros after the record, in which free
-        vibration is followed as far as it counts; ``n_rounds`` of ``CHECKED_STEPS``, and one.
+        vibration is followed as far as it counts.
     dt : float
         Time between samples, s.
-    strongest : (n_rounds,) ndarray
-        Largest acceleration in any direction from the start of each round on, m/s².
+    stride : int
+        Steps of a stride, of which a round has an even number.
     pairs : (12, n) ndarray
         Rows: circular frequency (rad/s), damping (fraction of critical), participation
         (dimensionless), yield displacement at contact level (m) and hardening of structure 1, then
@@ -64,78 +100,361 @@ def yielding_approach(north, east, dt, strongest, pairs, largest):
     largest : (2, n) ndarray
         Receives the maxima of ``q1 u1 - q2 u2``, m, and of ``q1 v1 - q2 v2``, m/s.
     """
+    until, after = _strongest(north, east)
+    # ground motion in strides and in steps
+    shapes = _shapes(stride)
+    moments = _moments(north, east, shapes)
+    ground = _single(north, east)
     table = np.zeros((ROWS, LANES))
-    for first in range(0, pairs.shape[1], LANES):
-        # the last block has copies of its last pair
-        for lane in range(LANES):
-            _pack(pairs, min(first + lane, pairs.shape[1] - 1), dt, table, lane)
-        local = aligned_line(table, ROWS, LANES)
-        # until nothing can raise a maximum
-        for number in range(strongest.size):
-            if _is_settled(local, strongest[number]):
-                break
-            _flush(local)
-            step = number * CHECKED_STEPS
-            for i in range(step, step + CHECKED_STEPS, 4):
-                n0, n1, n2, n3, n4 = (
-                    north[i],
-                    north[i + 1],
-                    north[i + 2],
-                    north[i + 3],
-                    north[i + 4],
-                )
-                e0, e1, e2, e3, e4 = east[i], east[i + 1], east[i + 2], east[i + 3], east[i + 4]
-                _step(local, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
-        # maxima of the block without the copies
-        for lane in range(min(LANES, pairs.shape[1] - first)):
-            largest[0, first + lane] = local[DISTANCE + lane]
-            largest[1, first + lane] = local[SPEED + lane]
+    largest[:] = 0.0
+    pending = np.empty(pairs.shape[1], np.int64)
+    for index in range(pending.size):
+        pending[index] = index
+    # the second time begins with what the first has reached
+    for again in range(2):
+        short, count = np.empty(pending.size, np.int64), 0
+        for first in range(0, pending.size, LANES):
+            # the last block has copies of its last pair
+            chosen = pending[first : first + LANES]
+            for lane in range(LANES):
+                number = chosen[min(lane, chosen.size - 1)]
+                _pack(pairs, number, dt, shapes, table, lane)
+                _start(pairs, number, dt, until, again, largest, table, lane)
+            local = aligned_single_line(table, ROWS, LANES)
+            _run(local, ground, moments, stride, after)
+            # maxima of the block without the copies
+            for lane in range(chosen.size):
+                largest[0, chosen[lane]] = local[DISTANCE + lane]
+                largest[1, chosen[lane]] = local[SPEED + lane]
+                if not again and _is_short(local, lane):
+                    short[count] = chosen[lane]
+                    count += 1
+        pending = short[:count]
+
+
+@kernel
+def _strongest(north, east):
+    """Return the largest acceleration up to the end of each round, and from its start on."""
+    rounds = (north.size - 1) // ROUND
+    until, after = np.zeros(rounds), np.zeros(rounds)
+    # of each round, and of those before it
+    for number in range(rounds):
+        square = 0.0
+        for i in range(number * ROUND, (number + 1) * ROUND + 1):
+            square = max(square, north[i] * north[i] + east[i] * east[i])
+        after[number] = math.sqrt(square)
+        until[number] = max(after[number], until[max(number - 1, 0)])
+    # and of those after it
+    for number in range(rounds - 2, -1, -1):
+        after[number] = max(after[number], after[number + 1])
+    return until, after
+
+
+@kernel
+def _shapes(stride):
+    """
+    Return three shapes of an acceleration over a stride, (3, samples), and their weights in sums.
+
+    They are polynomials that are orthogonal by the trapezoidal rule; a stride of one step has two.
+    """
+    # a constant, and half weights at both ends
+    shapes = np.empty((4, stride + 1))
+    # a line, and a parabola without the constant
+    total = 0.0
+    for k in range(stride + 1):
+        shapes[0, k], shapes[3, k] = 1.0, 1.0 if 0 < k < stride else 0.5
+        shapes[1, k] = k - 0.5 * stride
+        total += shapes[3, k] * shapes[1, k] * shapes[1, k]
+    for k in range(stride + 1):
+        shapes[2, k] = shapes[1, k] * shapes[1, k] - total / stride
+    return shapes
+
+
+@kernel
+def _single(north, east):
+    """Return both components in single precision."""
+    single = np.empty((2, north.size), np.float32)
+    for i in range(north.size):
+        single[0, i], single[1, i] = north[i], east[i]
+    return single
+
+
+@kernel
+def _moments(north, east, shapes):
+    """Return the sums over each stride of the samples of north and east times shapes, (n, 6)."""
+    stride = shapes.shape[1] - 1
+    moments = np.empty(((north.size - 1) // stride, 6), np.float32)
+    for number in range(moments.shape[0]):
+        n0 = n1 = n2 = e0 = e1 = e2 = 0.0
+        for k in range(stride + 1):
+            # a sample counts in three sums of either component
+            i = number * stride + k
+            along, across = shapes[3, k] * north[i], shapes[3, k] * east[i]
+            n0, n1, n2 = n0 + along, n1 + shapes[1, k] * along, n2 + shapes[2, k] * along
+            e0, e1, e2 = e0 + across, e1 + shapes[1, k] * across, e2 + shapes[2, k] * across
+        # north, then east
+        moments[number, 0], moments[number, 1], moments[number, 2] = n0, n1, n2
+        moments[number, 3], moments[number, 4], moments[number, 5] = e0, e1, e2
+    return moments
 
 
 @lean
-def _pack(pairs, number, dt, table, lane):
+def _pack(pairs, number, dt, shapes, table, lane):
     """Fill the column of a pair at rest."""
     # at rest
     for row in range(ROWS):
         table[row, lane] = 0.0
+    stride = shapes.shape[1] - 1
     for body in range(2):
         row, column = STRUCTURE * body, 5 * body
-        omega, share = pairs[column, number], pairs[column + 2, number]
-        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(
-            omega, pairs[column + 1, number], dt
+        omega, damping, share = (
+            pairs[column, number],
+            pairs[column + 1, number],
+            pairs[column + 2, number],
         )
+        coefficients = step_coefficients(omega, damping, dt)
+        a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
         # acceleration of a plastic displacement of 1
         drive = -(1.0 - pairs[column + 4, number]) * omega * omega
         # displacement after a step
-        table[row + 3, lane], table[row + 4, lane] = a11, a12
+        table[row + 3, lane], table[row + 4, lane] = a11 - 1.0, a12
         table[row + 5, lane] = drive * (b11 + b12)
         table[row + 6, lane], table[row + 7, lane] = share * b11, share * b12
         # velocity over omega after it
-        table[row + 8, lane], table[row + 9, lane] = a21, a22
+        table[row + 8, lane], table[row + 9, lane] = a21, a22 - 1.0
         table[row + 10, lane] = drive * (b21 + b22)
         table[row + 11, lane], table[row + 12, lane] = share * b21, share * b22
         # what yielding changes
         table[row + 13, lane], table[row + 14, lane] = drive * b12, drive * b22
         table[row + 15, lane] = pairs[column + 3, number]
         table[row + 16, lane] = 1.0 / (1.0 - drive * b12)
-        table[row + 17, lane], table[row + 18, lane] = omega, pairs[column + 4, number]
+        table[row + 17, lane], table[row + 18, lane] = omega, 1.0 - pairs[column + 4, number]
         # what an acceleration moves it at most
-        damping = min(pairs[column + 1, number], 0.999)
-        ratio = np.exp(-np.pi * damping / np.sqrt(1.0 - damping * damping))
-        ever = 2.0 / (1.0 - ratio) if damping > 0.0 else UNBOUNDED
-        table[row + 19, lane] = share * ever / (omega * omega)
+        table[row + 19, lane] = share * _longest_sum(damping) / (omega * omega)
+        # strides
+        for k in range(2):
+            u, z = 1.0 - k, float(k)
+            for _ in range(stride):
+                u, z = a11 * u + a12 * z, a21 * u + a22 * z
+            table[row + 21 + k, lane], table[row + 26 + k, lane] = u, z
+        _fill_shares(coefficients, share, shapes, table, row, lane)
     # direction
     table[DIRECTION, lane], table[DIRECTION + 1, lane] = pairs[10, number], pairs[11, number]
 
 
-@vectorised
-def _flush(t):
-    """Replace denormal numbers, which are slow, by zero."""
+@inlined
+def _longest_sum(damping):
+    """Return a bound of the integral of the size of the impulse response."""
+    limited = min(damping, 0.999)
+    ratio = math.exp(-math.pi * limited / math.sqrt(1.0 - limited * limited))
+    return 2.0 / (1.0 - ratio) if damping > 0.0 else UNBOUNDED
+
+
+@lean
+def _fill_shares(coefficients, share, shapes, table, row, lane):
+    """Fill what the moments of a stride add to a structure at its end."""
+    a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
+    stride = shapes.shape[1] - 1
+    for j in range(3):
+        # its motion from rest under the shape, and the moment of the shape itself
+        u = z = 0.0
+        own = shapes[3, 0] * shapes[j, 0] * shapes[j, 0]
+        for k in range(stride):
+            start, end = shapes[j, k], shapes[j, k + 1]
+            u, z = (
+                a11 * u + a12 * z + (b11 * start + b12 * end),
+                a21 * u + a22 * z + (b21 * start + b22 * end),
+            )
+            own += shapes[3, k + 1] * end * end
+        # two samples have no third shape
+        scale = share / own if j < 2 or stride > 1 else 0.0
+        table[row + 23 + j, lane], table[row + 28 + j, lane] = scale * u, scale * z
+
+
+@lean
+def _start(pairs, number, dt, until, again, largest, table, lane):
+    """Fill what the maxima need not reach, and the round before which the pair rests."""
+    # displacement and velocity by an acceleration of 1
+    reach, other = table[19, lane], table[STRUCTURE + 19, lane]
+    together, speed = reach + other, pairs[0, number] * reach + pairs[5, number] * other
+    # what was reached, or is expected
+    if again:
+        distance, approach = largest[0, number], largest[1, number]
+        table[DIRECTION + 2, lane], table[DIRECTION + 3, lane] = distance, approach
+    else:
+        part = EXPECTED * until[until.size - 1] if together < UNBOUNDED * 1e-10 else 0.0
+        distance, approach = part * together, part * speed
+    table[DIRECTION + 8, lane], table[DIRECTION + 9, lane] = distance, approach
+    # acceleration below which it neither yields nor exceeds them
+    counts = min(distance / together, approach / speed)
+    counts = min(counts, pairs[3, number] / reach, pairs[8, number] / other)
+    first = 0
+    while first < until.size and until[first] <= counts:
+        first += 1
+    # back to where all before is forgotten by then
+    rate = min(pairs[0, number] * pairs[1, number], pairs[5, number] * pairs[6, number])
+    fade, left = math.exp(-rate * ROUND * dt), 1.0
+    while first > 0 and left * until[min(first, until.size) - 1] > FORGOTTEN * counts:
+        first -= 1
+        left *= fade
+    table[DIRECTION + 11, lane] = first
+
+
+@lean
+def _is_short(t, lane):
+    """Return whether a pair does not reach what it was expected to."""
+    far, fast = t[DISTANCE + lane], t[SPEED + lane]
+    return far < t[DISTANCE_FLOOR + lane] or fast < t[SPEED_FLOOR + lane]
+
+
+@kernel
+def _run(t, ground, moments, stride, after):
+    """Advance a block through the rounds that count, until nothing can raise a maximum."""
+    # the first round of any pair
+    begin = t[START]
     for lane in range(LANES):
-        for body in range(0, 2 * SECOND, SECOND):
-            for row in (U, Z):
-                value = t[body + row + lane]
-                t[body + row + lane] = value if abs(value) > SMALLEST_STATE else 0.0
+        begin = min(begin, t[START + lane])
+    strides = ROUND // stride
+    for number in range(int(begin), after.size):
+        # until nothing counts any more
+        if number % CHECKED_ROUNDS == 0 and _is_settled(t, number, after[number]):
+            break
+        # in strides, until a pair counts
+        _begin_round(t)
+        for i in range(number * strides, (number + 1) * strides, 2):
+            m, o = moments[i], moments[i + 1]
+            _stride(t, m[0], m[1], m[2], m[3], m[4], m[5], o[0], o[1], o[2], o[3], o[4], o[5])
+        this = np.float32(number)
+        _mark(t, this)
+        # step by step
+        if _any_marked(t):
+            _take_steps(t, ground[0], ground[1], number * ROUND)
+        _end_round(t, this)
+
+
+@lean
+def _take_steps(t, north, east, first):
+    """Advance a block through a round step by step."""
+    # four steps between five samples
+    for i in range(first, first + ROUND, 4):
+        n0, n1, n2, n3, n4 = north[i], north[i + 1], north[i + 2], north[i + 3], north[i + 4]
+        e0, e1, e2, e3, e4 = east[i], east[i + 1], east[i + 2], east[i + 3], east[i + 4]
+        _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+
+
+@vectorised
+def _begin_round(t):
+    """Begin a round both ways."""
+    for lane in range(LANES):
+        # structures 1 and 2
+        for k in (lane, SECOND + lane):
+            t[BEFORE + k] = t[P + k]
+            t[W + k] = t[U + k] - t[RESTING + k] * t[P + k]
+            t[Y + k] = t[Z + k]
+            t[MOST + k] = t[LEAST + k] = NOTHING
+        # the pair
+        t[DISTANCE_BY_STRIDE + lane] = LOWEST
+        t[SPEED_BY_STRIDE + lane] = NOTHING
+        t[DISTANCE_BY_STEP + lane] = t[DISTANCE + lane]
+        t[SPEED_BY_STEP + lane] = t[SPEED + lane]
+
+
+@vectorised
+def _stride(t, n0, n1, n2, e0, e1, e2, n3, n4, n5, e3, e4, e5):
+    """Advance a block by two strides about rest, under three moments each of north and east."""
+    for lane in range(LANES):
+        other = SECOND + lane
+        # direction
+        cosine, sine = t[NORTH + lane], t[EAST + lane]
+        # largest values so far
+        omega, omega_2 = t[OMEGA + lane], t[OMEGA + other]
+        distance, speed = t[DISTANCE_BY_STRIDE + lane], t[SPEED_BY_STRIDE + lane]
+        most, least, most_2, least_2 = (
+            t[MOST + lane],
+            t[LEAST + lane],
+            t[MOST + other],
+            t[LEAST + other],
+        )
+        # first stride
+        m0, m1, m2 = cosine * n0 + sine * e0, cosine * n1 + sine * e1, cosine * n2 + sine * e2
+        u, z = _strode(t, lane, t[W + lane], t[Y + lane], m0, m1, m2)
+        w, y = _strode(t, other, t[W + other], t[Y + other], m0, m1, m2)
+        # largest values after it
+        distance, speed = max(distance, u - w), max(speed, omega * z - omega_2 * y)
+        most, least, most_2, least_2 = max(most, u), min(least, u), max(most_2, w), min(least_2, w)
+        # second stride
+        m0, m1, m2 = cosine * n3 + sine * e3, cosine * n4 + sine * e4, cosine * n5 + sine * e5
+        u, z = _strode(t, lane, u, z, m0, m1, m2)
+        w, y = _strode(t, other, w, y, m0, m1, m2)
+        # states and largest values after it
+        t[W + lane], t[Y + lane], t[W + other], t[Y + other] = u, z, w, y
+        t[DISTANCE_BY_STRIDE + lane] = max(distance, u - w)
+        t[SPEED_BY_STRIDE + lane] = max(speed, omega * z - omega_2 * y)
+        t[MOST + lane], t[LEAST + lane] = max(most, u), min(least, u)
+        t[MOST + other], t[LEAST + other] = max(most_2, w), min(least_2, w)
+
+
+@inlined
+def _strode(t, k, w, y, m0, m1, m2):
+    """Return the state of a structure about rest after a stride."""
+    # what the ground adds
+    force = t[W0 + k] * m0 + (t[W1 + k] * m1 + t[W2 + k] * m2)
+    drive = t[Y0 + k] * m0 + (t[Y1 + k] * m1 + t[Y2 + k] * m2)
+    return t[WW + k] * w + (t[WY + k] * y + force), t[YW + k] * w + (t[YY + k] * y + drive)
+
+
+@vectorised
+def _mark(t, number):
+    """Mark the pairs of which the round counts step by step."""
+    for lane in range(LANES):
+        other = SECOND + lane
+        # displacement at rest, and elastic one there
+        rest, rest_2 = t[RESTING + lane] * t[P + lane], t[RESTING + other] * t[P + other]
+        bent, bent_2 = rest - t[P + lane], rest_2 - t[P + other]
+        # largest elastic displacements to either side
+        bent, bent_2 = (
+            max(t[MOST + lane] + bent, -(t[LEAST + lane] + bent)),
+            max(t[MOST + other] + bent_2, -(t[LEAST + other] + bent_2)),
+        )
+        # near a maximum or a yield displacement
+        far = t[DISTANCE_BY_STRIDE + lane] + (rest - rest_2)
+        near = far > NEAR * max(t[DISTANCE + lane], t[DISTANCE_FLOOR + lane])
+        near |= t[SPEED_BY_STRIDE + lane] > NEAR * max(t[SPEED + lane], t[SPEED_FLOOR + lane])
+        near |= (bent > NEAR * t[LIMIT + lane]) | (bent_2 > NEAR * t[LIMIT + other])
+        t[BY_STEP + lane] = ONE if near & (number >= t[START + lane]) else NOTHING
+
+
+@lean
+def _any_marked(t):
+    """Return whether a pair is marked."""
+    marked = 0.0
+    for lane in range(0, LANES, 4):
+        first, second = t[BY_STEP + lane] + t[BY_STEP + lane + 1], t[BY_STEP + lane + 2]
+        marked += first + (second + t[BY_STEP + lane + 3])
+    return marked > 0.0
+
+
+@vectorised
+def _end_round(t, number):
+    """End a round: marked pairs by steps, others by strides; before its start a pair rests."""
+    for lane in range(LANES):
+        rests, by_step = number < t[START + lane], t[BY_STEP + lane] > NOTHING
+        # both structures
+        for k in (lane, SECOND + lane):
+            u = t[W + k] + t[RESTING + k] * t[BEFORE + k]
+            u, z = t[U + k] if by_step else u, t[Z + k] if by_step else t[Y + k]
+            t[U + k] = NOTHING if rests else _flushed(u)
+            t[Z + k] = NOTHING if rests else _flushed(z)
+            t[P + k] = t[P + k] if by_step else t[BEFORE + k]
+        # maxima of the pair
+        t[DISTANCE + lane] = t[DISTANCE_BY_STEP + lane] if by_step else t[DISTANCE + lane]
+        t[SPEED + lane] = t[SPEED_BY_STEP + lane] if by_step else t[SPEED + lane]
+
+
+@inlined
+def _flushed(value):
+    """Return a value, but zero for denormal ones, which are slow."""
+    return value if abs(value) > SMALLEST_STATE else NOTHING
 
 
 @vectorised
@@ -157,7 +476,7 @@ def _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
             t[P + other],
         )
         omega, omega_2 = t[OMEGA + lane], t[OMEGA + other]
-        distance, speed = t[DISTANCE + lane], t[SPEED + lane]
+        distance, speed = t[DISTANCE_BY_STEP + lane], t[SPEED_BY_STEP + lane]
         # first step
         u, z, p = _moved(t, lane, u, z, p, a0, a1)
         w, y, r = _moved(t, other, w, y, r, a0, a1)
@@ -176,8 +495,8 @@ def _step(t, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         # states and largest values after them
         t[U + lane], t[Z + lane], t[P + lane] = u, z, p
         t[U + other], t[Z + other], t[P + other] = w, y, r
-        t[DISTANCE + lane] = max(distance, u - w)
-        t[SPEED + lane] = max(speed, omega * z - omega_2 * y)
+        t[DISTANCE_BY_STEP + lane] = max(distance, u - w)
+        t[SPEED_BY_STEP + lane] = max(speed, omega * z - omega_2 * y)
 
 
 @inlined
@@ -185,9 +504,9 @@ def _moved(t, k, u, z, p, start, end):
     """Return the state of a structure after one step."""
     # as if it did not yield: exact where acceleration is linear between samples
     force = t[UP + k] * p + (t[U0 + k] * start + t[U1 + k] * end)
-    after = t[UU + k] * u + (t[UZ + k] * z + force)
+    after = u + (t[UU + k] * u + (t[UZ + k] * z + force))
     force = t[ZP + k] * p + (t[Z0 + k] * start + t[Z1 + k] * end)
-    speed = t[ZU + k] * u + (t[ZZ + k] * z + force)
+    speed = z + (t[ZU + k] * u + (t[ZZ + k] * z + force))
     # the elastic displacement is at most the yield displacement
     elastic, limit = after - p, t[LIMIT + k]
     grown = t[GROWTH + k] * (elastic - min(max(elastic, -limit), limit))
@@ -195,18 +514,20 @@ def _moved(t, k, u, z, p, start, end):
 
 
 @lean
-def _is_settled(t, acceleration):
+def _is_settled(t, number, acceleration):
     """Return whether an acceleration makes no structure yield, and raises no maximum."""
     for lane in range(LANES):
+        if number < t[START + lane]:
+            return False
         reach = speed = 0.0
         for body in range(2):
             k = body * SECOND + lane
             # about the displacement at rest, which a plastic one leaves
-            plastic = (1.0 - t[HARDENING + k]) * t[P + k]
+            plastic = t[RESTING + k] * t[P + k]
             from_rest = t[U + k] - plastic
-            radius = np.sqrt(from_rest * from_rest + t[Z + k] * t[Z + k])
+            radius = math.sqrt(from_rest * from_rest + t[Z + k] * t[Z + k])
             # what is there fades, and the ground adds this
-            radius += acceleration * t[REACH + k]
+            radius = ROUNDING * (radius + acceleration * t[REACH + k])
             if abs(plastic - t[P + k]) + radius > t[LIMIT + k]:
                 return False
             reach += radius + (plastic if body == 0 else -plastic)
