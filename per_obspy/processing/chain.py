@@ -8,7 +8,6 @@ Records processed by others pass with the corners of their header.
 import logging
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from functools import partial
 
 from obspy import Stream, Trace
 from obspy.core import AttribDict
@@ -196,22 +195,33 @@ def process_instrument(
     components = Stream(list(instrument))
     is_final = bool(components) and is_processed(components[0])
     pair, unusable = _physical_pair(components, settings, is_final)
-    if is_final:
-        choose = partial(pass_through, settings=settings)
-    else:
-        # All components around the shaking, then baseline and corners of each
-        pair = noise_windows(taken(pair), settings, source)
-        fallback = _fallback(pair, settings, source)
-        choose = partial(choose_corners, settings=settings, fallback=fallback)
     # Each component is judged by the others first
-    findings = component_findings(pair, settings.checks)
-    ready, undecided = survivors(
-        lambda trace: choose(judge(trace, findings.get(trace.id, ()))), taken(pair)
-    )
     if is_final:
+        findings = component_findings(pair, settings.checks)
+        ready, undecided = survivors(
+            lambda trace: pass_through(judge(trace, findings.get(trace.id, ())), settings),
+            taken(pair),
+        )
         return ready, (*unusable, *undecided)
+    # All components around the shaking, then baseline and corners of each
+    pair = noise_windows(taken(pair), settings, source)
+    fallback = _fallback(pair, settings, source)
+    findings = component_findings(pair, settings.checks)
+
+    # A `partial` or the variable of a step would keep the record that the next function gives up
+    def with_corners_chosen(trace: Trace) -> Trace:
+        judged = [judge(trace, findings.get(trace.id, ()))]
+        del trace
+        return choose_corners(judged.pop(), settings, fallback)
+
+    def filtered(trace: Trace) -> Trace:
+        given = [trace]
+        del trace
+        return _filter(given.pop(), settings)
+
+    ready, undecided = survivors(with_corners_chosen, taken(pair))
     ready = share_corners(taken(ready))
-    done, restless = survivors(partial(_filter, settings=settings), taken(ready))
+    done, restless = survivors(filtered, taken(ready))
     return done, (*unusable, *undecided, *restless)
 
 
@@ -263,9 +273,9 @@ def _filter(trace: Trace, settings: Processing) -> Trace:
     if settings.permanent_offset:
         trace = bandpass(trace, 0.0, corners.lowpass, order)
     else:
-        padded = pad(trace, corners.highpass, order)
-        trace = bandpass(padded, corners.highpass, corners.lowpass, order)
-        del padded
+        padded = [pad(trace, corners.highpass, order)]
+        del trace
+        trace = bandpass(padded.pop(), corners.highpass, corners.lowpass, order)
     trace = with_usable_periods(trace, settings.usable)
     findings = final_findings(trace, settings.checks)
     if settings.permanent_offset:

@@ -3,9 +3,9 @@ Figures of all benchmarks: one JSON file, and ``docs/benchmarks.md`` made of it.
 
     python tests/benchmarks/figures.py JSON [SCRIPT...]
 
-runs the benchmarks (or only some scripts) and writes the page. Their figures replace those of the
-same machine in the file; those of other machines stay. A script calls `note` for every figure; run
-alone, it only prints.
+runs the benchmarks (or only some scripts) and writes the page. Their figures replace those of
+machines of the same maker (AMD, Intel) in the file; those of others stay. A script calls `note` for
+every figure; run alone, it only prints.
 
 Vectors are as wide as the command line chooses them; it leaves the choice to the compiler where
 ``NUMBA_CPU_NAME`` (e.g. as `llvmlite.binding.get_host_cpu_name` returns it) or
@@ -219,11 +219,11 @@ def main(path: Path, scripts: list[str]) -> None:
     # A damaged file is found before hours of measurements
     kept = read(path) if path.is_file() else []
     found = measured(scripts or SCRIPTS, path.with_suffix(".lines"))
-    again = {(figure["machine"], figure["script"]) for figure in found}
-    if not scripts:
-        # none of this machine is left from an earlier run
-        again |= {(machine(), figure["script"]) for figure in kept}
-    figures = [one for one in kept if (one["machine"], one["script"]) not in again] + found
+    # None of this maker is left from an earlier run of all
+    again = {*(scripts or {figure["script"] for figure in kept})}
+    own = machine().split()[0]
+    kept = [one for one in kept if one["machine"].split()[0] != own or one["script"] not in again]
+    figures = kept + found
     path.write_text(json.dumps({"figures": figures}, indent=1) + "\n", "utf-8")
     PAGE.write_text(page(figures, TEMPLATE.read_text("utf-8")), "utf-8")
 

@@ -160,20 +160,24 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
     # Memory of the leading tiles, and the bound of every tile that is still to be visited
     tiles = (north.size - 1) // TILE
     states, forms = np.empty((4, TILE + 1)), np.empty((LEADERS, 3, TILE + 1))
+    squares = np.empty((4, TILE))
     marks, marked = np.empty(TILE + 1), np.zeros(TILE + 5, np.int64)
     bounds, leaders, above = np.empty(tiles), np.zeros(LEADERS), np.empty(best.size)
     for tile in range(tiles):
         bounds[tile] = checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]
     floor, least = floor_form(best, cosines, sines, above)
-    # Outermost samples of the tiles with the largest bounds
+    # Outermost samples of the tiles with the largest bounds, until none can raise anything
     for leader in range(LEADERS):
         tile = place_of_largest(bounds)
-        if bounds[tile] > least:
-            rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
-            fill_forms(states, share, forms[leader])
-            _raise_to_four(forms[leader], _outermost(forms[leader]), cosines, sines, best)
-            leaders[leader] = bounds[tile]
-            bounds[tile] = 0.0
+        if bounds[tile] <= least:
+            break
+        rerun_tile(north, east, checkpoints, tile, lane, coefficients, states)
+        fill_forms(states, share, forms[leader])
+        outermost = _outermost(forms[leader], squares)
+        _raise_to_four(forms[leader], outermost, cosines, sines, best)
+        leaders[leader] = bounds[tile]
+        bounds[tile] = 0.0
+        least = smallest(best)
     floor, least = floor_form(best, cosines, sines, above)
     visited = 0
     for visit in range(LEADERS + tiles):
@@ -194,18 +198,17 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
 
 
 @kernel
-def _outermost(forms):
-    """Return the samples of a tile with the largest squares along four azimuths."""
+def _outermost(forms, squares):
+    """Return the samples of a tile, but its last, with the largest squares along four azimuths."""
     # Half sum, half difference and product make the squares along 0, 90, 45 and 135 degrees
-    values = np.empty((4, TILE + 1))
-    for i in range(TILE + 1):
-        values[0, i], values[1, i] = forms[0, i] + forms[1, i], forms[0, i] - forms[1, i]
-        values[2, i], values[3, i] = forms[0, i] + forms[2, i], forms[0, i] - forms[2, i]
+    for i in range(TILE):
+        squares[0, i], squares[1, i] = forms[0, i] + forms[1, i], forms[0, i] - forms[1, i]
+        squares[2, i], squares[3, i] = forms[0, i] + forms[2, i], forms[0, i] - forms[2, i]
     return (
-        place_of_largest(values[0]),
-        place_of_largest(values[1]),
-        place_of_largest(values[2]),
-        place_of_largest(values[3]),
+        place_of_largest(squares[0]),
+        place_of_largest(squares[1]),
+        place_of_largest(squares[2]),
+        place_of_largest(squares[3]),
     )
 
 

@@ -15,6 +15,7 @@ from per_obspy.kernels.oscillator.within_step import (
     INVERSES,
     LONGEST_SPAN,
     ROOT_TOLERANCE,
+    TERMS,
     largest_in_step,
     series_terms,
     workspace,
@@ -22,6 +23,14 @@ from per_obspy.kernels.oscillator.within_step import (
 from per_obspy.kernels.spectra.tile_search import LANES
 
 NEWTON_STEPS = 6
+
+#: Rows of the memory of all problems: largest squares, and 1 where in doubt; root, value and slope
+#: there, bound of the second derivative, end of the search and tolerance of a condition; then the
+#: piece of a step, and the series of displacement and condition.
+SQUARE, DOUBT, ROOT, VALUE, SLOPE, BEND, HIGHEST, TOLERANCE, PIECE = range(9)
+DISPLACEMENT = PIECE + 4
+CONDITION = DISPLACEMENT + TERMS + 2
+ROWS = CONDITION + TERMS
 
 
 @kernel
@@ -33,17 +42,20 @@ def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
     end. Only the first ``count`` are looked at.
     """
     _, phase, damping, share = oscillator
-    squares, doubts = np.zeros(LANES), np.zeros(LANES)
+    # One piece of memory: twenty take longer than the arithmetic
+    room = np.empty((ROWS, LANES))
+    squares, doubts = room[SQUARE], room[DOUBT]
+    squares[:] = 0.0
+    doubts[:] = 0.0
     for row in range(4):
         problems[row, count:] = 0.0
     # All problems next to each other, in pieces short enough for the series
-    _raise_to_pieces(problems, phase, damping, share, squares, doubts)
+    _raise_to_pieces(problems, phase, damping, share, room)
     # Doubtful ones alone: at z = 0, for the radius also at 2 xi z + a = 0
-    largest, work = np.empty(4), workspace()
     selected = 3 if share == 1.0 else 2
     for lane in range(count):
         if doubts[lane] > 0.0:
-            largest[:] = 0.0
+            largest, work = np.zeros(4), workspace()
             u, z = problems[0, lane], problems[1, lane]
             start, end = problems[2, lane], problems[3, lane]
             largest_in_step(u, z, start, end, damping, phase, selected, work, largest)
@@ -52,33 +64,35 @@ def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
 
 
 @kernel
-def _raise_to_pieces(problems, phase, damping, share, squares, doubts):
+def _raise_to_pieces(problems, phase, damping, share, room):
     """Raise the squares to those within steps that are cut into pieces of equal length."""
     pieces = math.ceil(phase / LONGEST_SPAN)
     span = phase / pieces
     # An even number of terms
     pairs = (series_terms(span) + 1) // 2
-    displacement = np.empty((2 * pairs + 2, LANES))
-    condition = np.empty((2 * pairs, LANES))
-    roots, piece = np.empty(LANES), problems.copy()
+    displacement = room[DISPLACEMENT : DISPLACEMENT + 2 * pairs + 2]
+    condition = room[CONDITION : CONDITION + 2 * pairs]
+    piece = room[PIECE:DISPLACEMENT]
+    piece[:] = problems
     for lane in range(LANES):
         piece[3, lane] = piece[2, lane] + (piece[3, lane] - piece[2, lane]) / pieces
     # At the roots of both conditions, piece by piece
     for number in range(pieces):
         if number > 0:
-            _advance(displacement, span, piece)
+            _advance(displacement, span, room)
         _fill_displacement(piece, span, damping, displacement)
         for kind in range(2 if share == 1.0 else 1):
             _fill_condition(kind, piece, span, damping, displacement, condition)
-            _find_roots(condition, span, roots, doubts)
-            _raise_squares(displacement, roots, share, squares)
+            _find_roots(condition, span, room)
+            _raise_squares(displacement, share, room)
 
 
 @kernel
-def _advance(displacement, span, piece):
+def _advance(displacement, span, room):
     """Move the problems to the next piece of their step: state, and accelerations at its ends."""
-    spans, u, z = np.full(LANES, span), np.empty(LANES), np.empty(LANES)
-    _evaluate(displacement, spans, u, z)
+    u, z, piece = room[VALUE], room[SLOPE], room[PIECE:DISPLACEMENT]
+    room[ROOT] = span
+    _evaluate(displacement, room[ROOT], u, z)
     # The acceleration goes on along its straight line
     for lane in range(LANES):
         piece[0, lane], piece[1, lane] = u[lane], z[lane]
@@ -138,10 +152,11 @@ def _evaluate(series, phases, values, slopes):
 
 
 @kernel
-def _find_roots(condition, phase, roots, doubts):
+def _find_roots(condition, phase, room):
     """Fill the root of each condition within the step, or its start; mark the lanes in doubt."""
-    bends, values, slopes = np.zeros(LANES), np.empty(LANES), np.empty(LANES)
-    highest, tolerances = np.empty(LANES), np.empty(LANES)
+    doubts, roots, values, slopes = room[DOUBT], room[ROOT], room[VALUE], room[SLOPE]
+    bends, highest, tolerances = room[BEND], room[HIGHEST], room[TOLERANCE]
+    bends[:] = 0.0
     # Bound of the second derivative
     for n in range(condition.shape[0] - 1, 1, -1):
         for lane in range(LANES):
@@ -179,9 +194,9 @@ def _find_roots(condition, phase, roots, doubts):
 
 
 @kernel
-def _raise_squares(displacement, phases, share, squares):
-    """Raise the squares to those at the phases."""
-    u, z = np.empty(LANES), np.empty(LANES)
-    _evaluate(displacement, phases, u, z)
+def _raise_squares(displacement, share, room):
+    """Raise the squares to those at the roots."""
+    squares, u, z = room[SQUARE], room[VALUE], room[SLOPE]
+    _evaluate(displacement, room[ROOT], u, z)
     for lane in range(LANES):
         squares[lane] = max(squares[lane], u[lane] * u[lane] + share * z[lane] * z[lane])

@@ -32,7 +32,7 @@ TILE = 64
 #: Accumulators next to each other of a reduction, as many as fit into the widest vectors.
 SIDE = 8
 #: Tiles with a checkpoint at a time: memory stays constant however long the record is.
-TILES = 256
+TILES = 384
 #: States below this are set to zero (records are scaled to a peak of order one): denormal numbers
 #: are slow.
 SMALLEST_STATE = 1e-140

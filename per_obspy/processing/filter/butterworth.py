@@ -158,24 +158,37 @@ def acausal_bandpass(
 
     Corners and order are those of `butterworth_amplitude`.
     """
-    spectrum = rfft(samples)
-    frequencies = rfftfreq(samples.size, 1 / df)
+    return _filtered(rfft(samples), samples.size, df, (highpass, lowpass), order)
+
+
+def _filtered(
+    spectrum: NDArray[np.complex128],
+    count: int,
+    df: float,
+    corners: tuple[float, float],
+    order: int,
+) -> FloatArray:
+    """Return the filtered samples of a spectrum, which is overwritten."""
+    frequencies = rfftfreq(count, 1 / df)
     # Block by block: powers of all frequencies of a day take more memory than the record
     for block in blocks(0, frequencies.size):
-        spectrum[block] *= butterworth_amplitude(frequencies[block], highpass, lowpass, order)
-    out = irfft(spectrum, samples.size, overwrite_x=True)
-    forget_plans(samples.size)
+        spectrum[block] *= butterworth_amplitude(frequencies[block], *corners, order)
+    out = irfft(spectrum, count, overwrite_x=True)
+    forget_plans(count)
     return np.asarray(out)
 
 
 def bandpass(trace: Trace, highpass: float, lowpass: float, order: int) -> Trace:
     """Return a copy of a padded trace filtered by `acausal_bandpass`."""
-    rate = trace.stats.sampling_rate
-    samples = acausal_bandpass(trace.data, rate, highpass, lowpass, order)
+    spectrum, count, rate = rfft(trace.data), trace.stats.npts, trace.stats.sampling_rate
     # Corners as applied: a high-pass at 0 is none
     applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
     step = f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz"
-    return with_note(trace, step, samples, order=order, **applied)
+    out = with_note(trace, step, np.empty(0), order=order, **applied)
+    # The unfiltered samples of a day leave memory, if no other code holds them
+    del trace
+    out.data = _filtered(spectrum, count, rate, (highpass, lowpass), order)
+    return out
 
 
 def acausal_butterworth(

@@ -100,6 +100,7 @@ def choose_corners(trace: Trace, settings: Processing, fallback: Callable[[], Co
         offset is kept is not quiet before and after the shaking.
     """
     plain = without_mean(trace, float(trace.stats.per_obspy.noise))
+    del trace  # the raw record of a day leaves memory
     dt = plain.stats.delta
     shaking, is_quiet = shaking_of(plain)
     if is_quiet and not settings.permanent_offset:
