@@ -29,6 +29,9 @@ from per_obspy.spectra.trace_arguments import takes_trace
 #: thousandth of the promised exactness; of the approach, of which populations need hundreds, more.
 FORGOTTEN, FORGOTTEN_OF_APPROACH = 1e-12, 1e-7
 
+#: Part of the largest openings of linear structures that those which yield are expected to reach.
+EXPECTED_OPENING = 0.1
+
 #: Largest angle of a step of pairs that yield, rad, at which peaks between steps are missed by 1.5
 #: % at most; longest free vibration after the record, s.
 LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
@@ -345,6 +348,13 @@ def _maxima(
     return largest.reshape(3, *pairs.shape)
 
 
+def _run_apart(motion: FloatArray, dt: float, pairs: Pairs, openings: ArrayLike) -> FloatArray:
+    """Return rows of pairs that never touch, with openings larger than these; see `run_pairs`."""
+    kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
+    rows, _ = run_pairs(*kernel, motion, dt, pairs, free_vibration=True, counted_speed=openings)
+    return rows
+
+
 class YieldingRelativeDisplacement(NamedTuple):
     """
     Largest responses of pairs of bilinear structures that do not touch.
@@ -448,9 +458,15 @@ def yielding_relative_displacement(
         gap=UNREACHABLE,
     )
 
-    # Run pairs that never touch through the record and the free vibration after it
-    kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
-    rows, _ = run_pairs(*kernel, closed_record(record), step, pairs, free_vibration=True)
+    # Openings far below those of linear structures are not followed, nor those of twins: none
+    motion, twins = closed_record(record), pairs.are_twins
+    linear = _maxima(record[0], record[1], step, pairs, FORGOTTEN_OF_APPROACH, both_sides=True)
+    expected = EXPECTED_OPENING * linear[1::-1].reshape(2, -1).T
+    rows = _run_apart(motion, step, pairs, np.where(twins[:, None], UNREACHABLE, expected))
+    rows[twins, :, columns.OPENING] = 0.0
+    short = np.flatnonzero((rows[:, :, columns.OPENING] <= expected).any(axis=1) & ~twins)
+    if short.size:
+        rows[short] = _run_apart(motion, step, pairs.chosen(short), 0.0)
 
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
     openings = of_structures(rows[:, :, columns.OPENING], pairs.shape)
