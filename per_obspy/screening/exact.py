@@ -148,10 +148,11 @@ def _pounding_columns(
     """
     Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
 
-    A demand that stays below the gap needs no history: radii are those without contact, and so is
-    ``residual``, the displacements at rest afterwards, which receives those of the histories.
+    A demand that stays below the gap, or is 0, needs no history: radii are those without contact,
+    and so is ``residual``, the displacements at rest afterwards, which receives those of the
+    histories.
     """
-    meets = ~(demand < CERTAINLY_APART * values(table, "gap"))
+    meets = ~(demand < CERTAINLY_APART * values(table, "gap")) & (demand > 0.0)
     impacts, velocity = np.zeros(demand.size, dtype=np.int64), np.zeros(demand.size)
     amplification = np.ones((2, demand.size))
     if meets.any():
