@@ -348,10 +348,24 @@ def _maxima(
     return largest.reshape(3, *pairs.shape)
 
 
-def _run_apart(motion: FloatArray, dt: float, pairs: Pairs, openings: ArrayLike) -> FloatArray:
-    """Return rows of pairs that never touch, with openings larger than these; see `run_pairs`."""
+def _rows_apart(record: FloatArray, dt: float, pairs: Pairs) -> FloatArray:
+    """
+    Return the rows of pairs that never touch, see `run_pairs`.
+
+    Openings far below those of linear structures are not followed, nor those of twins: none.
+    """
     kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
-    rows, _ = run_pairs(*kernel, motion, dt, pairs, free_vibration=True, counted_speed=openings)
+    run = partial(run_pairs, *kernel, closed_record(record), dt, free_vibration=True)
+    linear = _maxima(record[0], record[1], dt, pairs, FORGOTTEN_OF_APPROACH, both_sides=True)
+    # u2 - u1, then u1 - u2
+    expected = EXPECTED_OPENING * linear[1::-1].reshape(2, -1).T
+    twins = pairs.are_twins
+    rows, _ = run(pairs, counted_speed=np.where(twins[:, None], UNREACHABLE, expected))
+    rows[twins, :, columns.OPENING] = 0.0
+    # what falls short of it again
+    short = np.flatnonzero((rows[:, :, columns.OPENING] <= expected).any(axis=1) & ~twins)
+    if short.size:
+        rows[short], _ = run(pairs.chosen(short))
     return rows
 
 
@@ -458,16 +472,7 @@ def yielding_relative_displacement(
         gap=UNREACHABLE,
     )
 
-    # Openings far below those of linear structures are not followed, nor those of twins: none
-    motion, twins = closed_record(record), pairs.are_twins
-    linear = _maxima(record[0], record[1], step, pairs, FORGOTTEN_OF_APPROACH, both_sides=True)
-    expected = EXPECTED_OPENING * linear[1::-1].reshape(2, -1).T
-    rows = _run_apart(motion, step, pairs, np.where(twins[:, None], UNREACHABLE, expected))
-    rows[twins, :, columns.OPENING] = 0.0
-    short = np.flatnonzero((rows[:, :, columns.OPENING] <= expected).any(axis=1) & ~twins)
-    if short.size:
-        rows[short] = _run_apart(motion, step, pairs.chosen(short), 0.0)
-
+    rows = _rows_apart(record, step, pairs)
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
     openings = of_structures(rows[:, :, columns.OPENING], pairs.shape)
     return YieldingRelativeDisplacement(

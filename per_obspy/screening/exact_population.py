@@ -216,10 +216,9 @@ def _sampled(block: _Block) -> Columns:
     # first nodes
     few = _node_motion(block, NODES[:FIRST_NODES])
     chance = chance_of_contact(few.demand, block.site.log_std, block.table)
-    certain = (chance <= CERTAIN) | (chance >= 1.0 - CERTAIN)
-    certain &= nodes_suffice(few.demand, median_gap(block.table))
-    # drawn outlines that touch may still have a gap
-    certain |= (values(block.table, "gap") == 0.0) & (gap_dispersion(block.table) == 0.0)
+    gap, certain = median_gap(block.table), (chance <= CERTAIN) | (chance >= 1.0 - CERTAIN)
+    # outlines that are drawn without a gap may still have one
+    certain = (certain & nodes_suffice(few.demand, gap)) | (gap == 0.0)
     # the others where they may change the probability
     result = empty_population(chance.size)
     for number, mask in ((FIRST_NODES, certain), (len(NODES), ~certain)):
