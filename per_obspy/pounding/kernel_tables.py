@@ -260,12 +260,13 @@ def run_pairs(
     dt: float,
     pairs: Pairs,
     free_vibration: bool,
-    counted_speed: float = 0.0,
+    counted_speed: ArrayLike = 0.0,
 ) -> tuple[FloatArray, IntArray]:
     """
     Return the rows of pairs after a record, see `run_blocks`, and their impacts that count.
 
-    Impacts count from `counted_speed` on, m/s; kernels that follow openings know none.
+    Impacts count from `counted_speed` on, m/s. Kernels that follow openings know none; they look
+    for larger openings than these, (n_pairs, 2), m.
     """
     table = pair_table(pairs)
     parts = refinement(pairs.frequency.max(axis=0, initial=0.0), dt)
@@ -276,7 +277,7 @@ def run_pairs(
     rows[:, 0, columns.STICKING_SPEED] = velocity * pairs.participation.max(axis=0)
     rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
     rows[:, 0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS
-    rows[:, 0, columns.COUNTED_SPEED] = counted_speed
+    rows[:, :, columns.COUNTED_SPEED] = counted_speed
 
     # Run the record and, where it is asked for, the free vibration after it
     free_steps = free_samples(pairs.period.max(axis=0), dt) * free_vibration

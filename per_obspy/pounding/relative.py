@@ -30,6 +30,9 @@ from per_obspy.spectra.trace_arguments import takes_trace
 #: thousandth of the promised exactness; of the approach, of which populations need hundreds, more.
 FORGOTTEN, FORGOTTEN_OF_APPROACH = 1e-12, 1e-7
 
+#: Part of the largest openings of linear structures that those which yield are expected to reach.
+EXPECTED_OPENING = 0.1
+
 #: Largest angle of a step of pairs that yield, rad, at which peaks between steps are missed by 1.5
 #: % at most; longest free vibration after the record, s.
 LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
@@ -362,6 +365,27 @@ def _maxima(
     return largest.reshape(3, *pairs.shape)
 
 
+def _rows_apart(record: FloatArray, dt: float, pairs: Pairs) -> FloatArray:
+    """
+    Return the rows of pairs that never touch, see `run_pairs`.
+
+    Openings far below those of linear structures are not followed, nor those of twins: none.
+    """
+    kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
+    run = partial(run_pairs, *kernel, closed_record(record), dt, free_vibration=True)
+    linear = _maxima(record[0], record[1], dt, pairs, FORGOTTEN_OF_APPROACH, both_sides=True)
+    # u2 - u1, then u1 - u2
+    expected = EXPECTED_OPENING * linear[1::-1].reshape(2, -1).T
+    twins = pairs.are_twins
+    rows, _ = run(pairs, counted_speed=np.where(twins[:, None], UNREACHABLE, expected))
+    rows[twins, :, columns.OPENING] = 0.0
+    # what falls short of it again
+    short = np.flatnonzero((rows[:, :, columns.OPENING] <= expected).any(axis=1) & ~twins)
+    if short.size:
+        rows[short], _ = run(pairs.chosen(short))
+    return rows
+
+
 class YieldingRelativeDisplacement(NamedTuple):
     """
     Largest responses of pairs of bilinear structures that do not touch.
@@ -465,10 +489,7 @@ def yielding_relative_displacement(
         gap=UNREACHABLE,
     )
 
-    # Run pairs that never touch through the record and the free vibration after it
-    kernel = partial(run_block, kind=APART), LANE_ROWS_WITHOUT_CONTACT
-    rows, _ = run_pairs(*kernel, closed_record(record), step, pairs, free_vibration=True)
-
+    rows = _rows_apart(record, step, pairs)
     # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
     openings = of_structures(rows[:, :, columns.OPENING], pairs.shape)
     return YieldingRelativeDisplacement(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf, pi, prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
@@ -123,6 +124,18 @@ class Pairs:
             lines = np.stack(rows) if rows else default
             fields[name] = lines if name in _CHECKS else lines[0]
         return cls(shape, **fields)
+
+    def chosen(self, numbers: NDArray[np.intp]) -> "Pairs":
+        """Return some of the pairs by their numbers."""
+        fields = {name: getattr(self, name)[..., numbers] for name in PAIR_CHECKS}
+        return Pairs(numbers.shape, **fields)
+
+    @property
+    def are_twins(self) -> NDArray[np.bool_]:
+        """Mask of the pairs of structures that move as one while they do not touch."""
+        motion = "period", "damping", "participation", "yield_displacement", "hardening"
+        same = [np.equal(*getattr(self, name)) for name in motion]
+        return np.asarray(np.all(same, axis=0))
 
     @property
     def frequency(self) -> FloatArray:

@@ -27,6 +27,7 @@ from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.station_motion import StationMotion
 from per_obspy.screening.values import (
     BoolArray,
+    Both,
     Columns,
     Table,
     at_contact,
@@ -148,10 +149,11 @@ def _pounding_columns(
     """
     Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
 
-    A demand that stays below the gap needs no history: radii are those without contact, and so is
-    ``residual``, the displacements at rest afterwards, which receives those of the histories.
+    A demand that stays below the gap, or is 0, needs no history: radii are those without contact,
+    and so is ``residual``, the displacements at rest afterwards, which receives those of the
+    histories.
     """
-    meets = ~(demand < CERTAINLY_APART * values(table, "gap"))
+    meets = ~(demand < CERTAINLY_APART * values(table, "gap")) & (demand > 0.0)
     impacts, velocity = np.zeros(demand.size, dtype=np.int64), np.zeros(demand.size)
     amplification = np.ones((2, demand.size))
     if meets.any():
@@ -306,12 +308,19 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
     table = only(table, NEEDED)
     # As far as both buildings still vibrate
     most = np.minimum(largest, NEARLY_CRITICAL - np.maximum(*both(table, "damping")))
-    enough, low = np.full((2, most.size), np.nan)
-    scan = np.arange(1, int(np.ceil(largest / SCAN_STEP - 1e-9)) + 1)
-    # Scan: pairs that are helped or at their limit leave it
-    waiting = np.arange(most.size)
+    low, enough = _scanned(station, table, most, int(np.ceil(largest / SCAN_STEP - 1e-9)))
+    _refine(station, table, low, enough)
+    return enough
+
+
+def _scanned(station: StationMotion, table: Table, most: FloatArray, count: int) -> Both:
+    """Return the last step that is too little, and the first that is enough; NaN if none is."""
+    low, enough = np.full((2, most.size), np.nan)
+    scan, waiting = np.arange(1, count + 1), np.arange(most.size)
+    # Pairs that are helped or at their limit leave it
     while scan.size and waiting.size:
-        steps = scan[: max(TOGETHER // waiting.size, 1)]
+        # as many steps as take the time of one
+        steps = scan[: _together(waiting.size)]
         added = np.minimum(steps * SCAN_STEP, most[waiting, None])
         fits = _fits(station, chosen(table, waiting), added)
         helped, first = fits.any(axis=1), fits.argmax(axis=1)
@@ -319,8 +328,12 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
         low[waiting[helped]] = (steps[first[helped]] - 1) * SCAN_STEP
         waiting = waiting[~helped & (added[:, -1] < most[waiting])]
         scan = scan[steps.size :]
-    _refine(station, table, low, enough)
-    return enough
+    return low, enough
+
+
+def _together(pairs: int) -> int:
+    """Return how many dampings of each of some pairs take about as long as one."""
+    return max(TOGETHER // pairs, 1)
 
 
 def _refine(station: StationMotion, table: Table, low: FloatArray, enough: FloatArray) -> None:
@@ -331,17 +344,22 @@ def _refine(station: StationMotion, table: Table, low: FloatArray, enough: Float
     left = HALVINGS if helped.size else 0
     while left:
         # every damping that the next halvings may ask for
-        halvings = min(max(int(np.log2(TOGETHER / helped.size + 1.0)), 1), left)
-        grid = np.stack([low[helped], enough[helped]], axis=1)
-        for _ in range(halvings):
-            middles = 0.5 * (grid[:, :-1] + grid[:, 1:])
-            grid = np.insert(grid, np.arange(1, len(grid.T)), middles, axis=1)
+        halvings = min(int(np.log2(_together(helped.size) + 1)), left)
+        grid = _halved(np.stack([low[helped], enough[helped]], axis=1), halvings)
         fits = _fits(station, pairs, grid[:, 1:-1])
         first = np.zeros_like(number)
         for half in 2 ** np.arange(halvings)[::-1]:
             first += np.where(fits[number, first + half - 1], 0, half)
         low[helped], enough[helped] = grid[number, first], grid[number, first + 1]
         left -= halvings
+
+
+def _halved(grid: FloatArray, times: int) -> FloatArray:
+    """Return the points of each row with their middles between them, so many times."""
+    for _ in range(times):
+        middles = 0.5 * (grid[:, :-1] + grid[:, 1:])
+        grid = np.insert(grid, np.arange(1, len(grid.T)), middles, axis=1)
+    return grid
 
 
 def _fits(station: StationMotion, table: Table, added: FloatArray) -> BoolArray:

@@ -22,7 +22,6 @@ Where the first nodes leave no doubt about contact, with a margin, the others ar
 histories.
 """
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -161,14 +160,8 @@ def record_population(station: StationMotion, table: Table, screening: Screening
         _fill(result, estimated, estimated_population(motion, station.per, part))
     by_record = exact | _may_touch(station, table, result["probability"])
     uncertain = building_is_uncertain(table)
-    # drawn outlines that touch may still have a gap
-    touching = (values(table, "gap") == 0.0) & (gap_dispersion(table) == 0.0)
     # exact demands in blocks, which bound the memory; a pair does not depend on its block
-    for mask, outcome in (
-        (~uncertain, _of_certain_buildings),
-        (uncertain & touching, partial(_sampled, count=FIRST_NODES)),
-        (uncertain & ~touching, partial(_sampled, count=len(NODES))),
-    ):
+    for mask, outcome in ((~uncertain, _of_certain_buildings), (uncertain, _sampled)):
         for rows in _blocks(by_record & mask):
             _fill(result, rows, outcome(_block(station, chosen(table, rows), screening)))
     return result
@@ -218,17 +211,17 @@ def _of_certain_buildings(block: _Block) -> Columns:
     return result | {name: np.where(certain, history[name], result[name]) for name in history}
 
 
-def _sampled(block: _Block, count: int) -> Columns:
+def _sampled(block: _Block) -> Columns:
     """Return the population of uncertain buildings, at all nodes if the first are inconclusive."""
     # first nodes
     few = _node_motion(block, NODES[:FIRST_NODES])
     chance = chance_of_contact(few.demand, block.site.log_std, block.table)
-    certain = (chance <= CERTAIN) | (chance >= 1.0 - CERTAIN)
-    certain &= nodes_suffice(few.demand, median_gap(block.table))
-    doubtful = ~certain & (count > FIRST_NODES)
+    gap, certain = median_gap(block.table), (chance <= CERTAIN) | (chance >= 1.0 - CERTAIN)
+    # outlines that are drawn without a gap may still have one
+    certain = (certain & nodes_suffice(few.demand, gap)) | (gap == 0.0)
     # the others where they may change the probability
     result = empty_population(chance.size)
-    for number, mask in ((FIRST_NODES, ~doubtful), (count, doubtful)):
+    for number, mask in ((FIRST_NODES, certain), (len(NODES), ~certain)):
         rows = np.flatnonzero(mask)
         if not rows.size:
             continue

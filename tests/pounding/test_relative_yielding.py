@@ -75,6 +75,29 @@ def test_a_gap_is_closed_exactly_below_the_largest_relative_displacement(ground,
         assert_array_equal(history.impact_velocity > 0.0, pounds)
 
 
+def test_openings_below_what_is_expected_are_found(ground, pairs, strength, monkeypatch):
+    # catches: the second run left out, which finds what yields far less than a linear pair opens
+    found = yielding_relative_displacement(ground, DT, **pairs, **strength)
+    for expected in (0.0, 1.0, 100.0):
+        monkeypatch.setattr(relative, "EXPECTED_OPENING", expected)
+        again = yielding_relative_displacement(ground, DT, **pairs, **strength)
+        # the same search of other tiles beside it
+        assert_allclose(again.one_before_two, found.one_before_two, rtol=1e-9)
+        assert_allclose(again.two_before_one, found.two_before_one, rtol=1e-9)
+        assert_allclose(again.residual, found.residual, rtol=1e-9, atol=1e-12)
+
+
+def test_twins_that_yield_never_part(ground, pairs, strength):
+    # catches: a pair taken for twins that yields otherwise, and what it was told to expect kept
+    twins = {name: both[name.replace("2", "1")] for both in (pairs, strength) for name in both}
+    assert not yielding_relative_displacement(ground, DT, **twins).largest.any()
+    twins["yield_displacement_2"] = twins["yield_displacement_1"] / 2.0
+    weaker = yielding_relative_displacement(ground, DT, **twins)
+    yields = weaker.displacement_maxima[1] > twins["yield_displacement_2"]
+    assert yields.any()
+    assert_array_equal(weaker.largest > 0.0, yields)
+
+
 def oscillator(number, along, pairs, strength, index):
     """Return the response of structure 1 or 2 of a pair on its own."""
     arguments = [pairs[f"{name}_{number}"][index] for name in ("period", "damping")]

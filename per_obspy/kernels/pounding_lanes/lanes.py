@@ -264,37 +264,6 @@ def advance_pairs(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         lanes[at(TILE_CONTACT, lane)] = least
 
 
-@inlined
-def _step_apart(lanes, lane, both, n0, e0, n1, e1):
-    """Return both buildings of a lane, and the extremes of u2 - u1 to both sides, after a step."""
-    left, right, opening, closing = both
-    cosine = lanes[at(AXIS_COSINE, lane)]
-    sine = lanes[at(AXIS_SINE, lane)]
-    a0 = cosine * n0 + sine * e0
-    a1 = cosine * n1 + sine * e1
-    left = step_structure(lanes, lane, left, a0, a1)
-    right = step_structure(lanes, lane + BANK, right, a0, a1)
-    relative = right[0] - left[0]
-    return left, right, max(opening, relative), max(closing, -relative)
-
-
-@vectorised
-def advance_apart(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
-    """Step both buildings of every lane four times, and follow their relative displacement."""
-    for lane in range(PAIR_LANES):
-        left = load_structure(lanes, lane)
-        right = load_structure(lanes, lane + BANK)
-        both = left, right, lanes[at(TILE_RELATIVE, lane)], lanes[at(TILE_RELATIVE + 1, lane)]
-        both = _step_apart(lanes, lane, both, n0, e0, n1, e1)
-        both = _step_apart(lanes, lane, both, n1, e1, n2, e2)
-        both = _step_apart(lanes, lane, both, n2, e2, n3, e3)
-        both = _step_apart(lanes, lane, both, n3, e3, n4, e4)
-        store_structure(lanes, lane, both[0])
-        store_structure(lanes, lane + BANK, both[1])
-        lanes[at(TILE_RELATIVE, lane)] = both[2]
-        lanes[at(TILE_RELATIVE + 1, lane)] = both[3]
-
-
 @vectorised
 def advance_buildings(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
     """Step the building of every lane four times; its states are needed by the lane before."""
@@ -525,8 +494,6 @@ def _advance_four_steps(kind, lanes, ground, k):
     # contact functions of rows read the states of the next lane
     if kind == PAIRS:
         advance_pairs(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
-    elif kind == APART:
-        advance_apart(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
     else:
         advance_buildings(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
 
@@ -573,7 +540,7 @@ def sweep_tile(kind, lanes, flags, ground, count):
         # speeds of yielding buildings at every fourth sample
         if yields and k % UNROLLED_STEPS == 0:
             lower_speeds(lanes, kind, k == 0)
-        if k + UNROLLED_STEPS <= count:
+        if kind != APART and k + UNROLLED_STEPS <= count:
             _advance_four_steps(kind, lanes, ground, k)
             k += UNROLLED_STEPS
         else:

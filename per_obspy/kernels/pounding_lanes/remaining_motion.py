@@ -32,7 +32,6 @@ from per_obspy.kernels.pounding_events.motion import (
     HARDENING,
     LARGEST_DISPLACEMENT,
     MASS,
-    OPENING,
     PARTICIPATION,
     PHASE,
     PLASTIC,
@@ -56,7 +55,7 @@ REACH = TAYLOR + 5
 
 
 @lean
-def remains_still(row, cosine, sine, sizes, duration, group, is_apart):
+def remains_still(row, cosine, sine, sizes, duration, group):
     """
     Return whether the motion from a group of samples on can change no result of a row.
 
@@ -74,8 +73,6 @@ def remains_still(row, cosine, sine, sizes, duration, group, is_apart):
         Of a group, s.
     group : int
         Number of the first group of the rest of the record.
-    is_apart : bool
-        Whether the row is a pair that never touches, whose relative displacement is a result.
 
     Returns
     -------
@@ -90,7 +87,8 @@ def remains_still(row, cosine, sine, sizes, duration, group, is_apart):
         # two buildings that move as one keep their gap
         row[first, CLEARANCE] = math.inf
         if first > 0 and not (before == last - 1 and _moves_as_one(row, before, last)):
-            row[first, CLEARANCE] = CERTAIN * _clearance(row, first, is_apart)
+            shift = _centre(row, first) - _centre(row, first - 1)
+            row[first, CLEARANCE] = CERTAIN * (row[first - 1, GAP] + shift)
         before = first
         first = last + 1
     # group of samples after group of samples, and once more after the record
@@ -101,15 +99,6 @@ def remains_still(row, cosine, sine, sizes, duration, group, is_apart):
         if not _stays_below(row, size):
             return False
     return True
-
-
-@lean
-def _clearance(row, i, is_apart):
-    """Return by how far a building and that on its left may leave their centres together."""
-    shift = _centre(row, i) - _centre(row, i - 1)
-    if is_apart:
-        return min(row[i - 1, OPENING] - shift, row[i, OPENING] + shift)
-    return row[i - 1, GAP] + shift
 
 
 @lean

@@ -195,10 +195,12 @@ def _retire(kind, lanes, memory, firsts, cosine, sine, record, grounds, free_ste
                 search_deferred(lanes, here, own, row, i, deferred, record, grounds[1])
             read_states(lanes, here, own, i * STRUCTURE_ROWS)
         load_row(own, row)
-        is_over = is_free and (is_relative_settled(row) if kind == APART else is_settled(row))
-        is_over = is_over or remains_still(
-            row, cosine[number], sine[number], record.sizes, duration, group, kind == APART
-        )
+        if kind == APART:
+            is_over = is_free and is_relative_settled(row)
+        else:
+            is_over = (is_free and is_settled(row)) or remains_still(
+                row, cosine[number], sine[number], record.sizes, duration, group
+            )
         # at rest from now on
         if is_over or (is_free and elapsed >= free_steps[number]):
             for i in range(row.shape[0]):

@@ -90,24 +90,24 @@ def _equal_pair(displacement):
 def test_equal_structures_with_one_state_move_as_one():
     # catches: an impact that is possible, because equation or state of one differs a little
     quiet = np.zeros((2, 40))
-    assert not remains_still(_equal_pair(0.2), 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(_equal_pair(0.2), 1.0, 0.0, quiet, 1.28, 0)
     for column in (
         columns.STIFFNESS, columns.DAMPING_RATE, columns.PARTICIPATION, columns.U, columns.V
     ):  # fmt: skip
         other = _equal_pair(5e-3)
-        assert remains_still(other, 1.0, 0.0, quiet, 1.28, 0, False)
+        assert remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
         other[1, column] += 1e-9
-        assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0, False)
+        assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
     # a gap between both stays as it is, unless only one of both moves so
     other = _equal_pair(5e-3)
     other[0, columns.GAP] = 1e-4
-    assert remains_still(other, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
     other[1, columns.V] += 1e-9
-    assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
     # one that yields is no linear structure
     other = _equal_pair(5e-3)
     other[0, columns.YIELD] = 0.01
-    assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
 
 
 def test_equal_structures_that_touch_are_the_same_bits_as_through_the_whole_record(monkeypatch):
@@ -125,13 +125,13 @@ def test_equal_structures_that_touch_are_the_same_bits_as_through_the_whole_reco
 
 def test_a_pair_that_may_yield_or_touch_goes_on():
     quiet = np.zeros((2, 40))
-    assert not remains_still(_row(0.03, gap=0.05), 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(_row(0.03, gap=0.05), 1.0, 0.0, quiet, 1.28, 0)
     row = _row(0.01, gap=0.05)
-    assert remains_still(row, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
     row[0, columns.YIELD] = 0.009
-    assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
     row[0, columns.YIELD], row[0, columns.PHASE] = 0.05, 1.0
-    assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
 
 
 def test_a_quiet_pair_is_still_and_an_excited_one_is_not():
@@ -139,19 +139,19 @@ def test_a_quiet_pair_is_still_and_an_excited_one_is_not():
     late[0, 30] = 0.1
     for gap in (0.0, 0.05):
         row = _row(1e-5, gap=gap)
-        assert remains_still(row, 1.0, 0.0, quiet, 1.28, 0, False)
+        assert remains_still(row, 1.0, 0.0, quiet, 1.28, 0)
         # a late pulse counts only along its direction, and not once it is over
         strong = 60.0 * late
-        assert not remains_still(row, 1.0, 0.0, strong, 1.28, 0, False)
-        assert remains_still(row, 0.0, 1.0, strong, 1.28, 0, False)
-        assert remains_still(row, 1.0, 0.0, strong, 1.28, 31, False)
-        assert not remains_still(_row(0.2, gap=gap), 1.0, 0.0, quiet, 1.28, 0, False)
+        assert not remains_still(row, 1.0, 0.0, strong, 1.28, 0)
+        assert remains_still(row, 0.0, 1.0, strong, 1.28, 0)
+        assert remains_still(row, 1.0, 0.0, strong, 1.28, 31)
+        assert not remains_still(_row(0.2, gap=gap), 1.0, 0.0, quiet, 1.28, 0)
 
 
 def test_impacts_that_count_keep_a_touching_pair_going():
     quiet = np.zeros((2, 40))
     # released from 5 mm both are at most 5e-3 omega fast; 1 % of 1 m/s counts
-    assert not remains_still(_row(5e-3), 1.0, 0.0, quiet, 1.28, 0, False)
-    assert remains_still(_row(5e-3, fastest=50.0), 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(_row(5e-3), 1.0, 0.0, quiet, 1.28, 0)
+    assert remains_still(_row(5e-3, fastest=50.0), 1.0, 0.0, quiet, 1.28, 0)
     # before the first impact every impact is the fastest
-    assert not remains_still(_row(1e-9, fastest=0.0), 1.0, 0.0, quiet, 1.28, 0, False)
+    assert not remains_still(_row(1e-9, fastest=0.0), 1.0, 0.0, quiet, 1.28, 0)

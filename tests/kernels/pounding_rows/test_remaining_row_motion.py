@@ -94,7 +94,7 @@ def row_of(displacement, gaps, largest=0.1, fastest=1.0):
 def is_still(row, sizes=None, group=0, direction=(1.0, 0.0)):
     """Return whether a row remains still under a ground that is quiet if not given."""
     sizes = np.zeros((2, 40)) if sizes is None else sizes
-    return remains_still(row, *direction, sizes, 1.28, group, False)
+    return remains_still(row, *direction, sizes, 1.28, group)
 
 
 @pytest.mark.parametrize("gaps", [(0.0, 0.0), (0.0, 0.05), (0.05, 0.0), (0.05, 0.05)])
@@ -216,7 +216,7 @@ def test_the_norm_bounds_that_of_a_hit_row(seed, damping):
     early = np.sqrt((mass * (v**2 + 2.0 * rate * u * v + stiffness * u**2)).sum())
     for end in range(1, 5):
         sample = 64 * end
-        assert remains_still(row, 1.0, 0.0, sizes[:, :end], 64 * DT, 0, False)
+        assert remains_still(row, 1.0, 0.0, sizes[:, :end], 64 * DT, 0)
         # just after the pulse hardly any energy is lost
         assert early < row[0, GAIN] * sizes[0, 0]
         assert early > 0.92 * row[0, GAIN] * sizes[0, 0] or damping > 0.04
