@@ -203,6 +203,14 @@ def process_instrument(
             taken(pair),
         )
         return ready, (*unusable, *undecided)
+    done, rejected = _filtered_pair(pair, settings, source)
+    return done, (*unusable, *rejected)
+
+
+def _filtered_pair(
+    pair: Stream, settings: Processing, source: Source | None
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """Return the components, m/s2, without baseline and filtered; empty the input."""
     # All components around the shaking, then baseline and corners of each
     pair = noise_windows(taken(pair), settings, source)
     fallback = _fallback(pair, settings, source)
@@ -222,7 +230,7 @@ def process_instrument(
     ready, undecided = survivors(with_corners_chosen, taken(pair))
     ready = share_corners(taken(ready))
     done, restless = survivors(filtered, taken(ready))
-    return done, (*unusable, *undecided, *restless)
+    return done, (*undecided, *restless)
 
 
 def _physical_pair(

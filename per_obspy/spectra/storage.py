@@ -56,7 +56,7 @@ def _write_variable(
     stored = file.createVariable(
         name,
         str if is_text else variable.dtype,
-        variable.dims,
+        [str(axis) for axis in variable.dims],
         fill_value=np.nan if variable.dtype.kind == "f" and places is not None else None,
         # Processed samples take as much space compressed, and twice the time
         zlib=variable.size >= FEWEST_COMPRESSED and name != "acceleration",
