@@ -195,7 +195,7 @@ def _may_join_yielding(members, row, states):
 
 
 @lean
-def _change_stiffnesses(members, row, states, segment):
+def change_stiffnesses(members, row, states, segment):
     """
     Carry a row through a step in which buildings yield or unload, each on its own.
 
@@ -384,7 +384,7 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
         touches = _may_touch_in_step(members, row, states, before, after, duration)
         yields = _may_yield_in_step(members, row, states)
         segment = segment_of_step(row, before, after, duration)
-        if yields and not touches and _change_stiffnesses(members, row, states, segment):
+        if yields and not touches and change_stiffnesses(members, row, states, segment):
             # each building on its own, to the end of the step
             for i in range(row.shape[0]):
                 own, end = i * STRUCTURE_ROWS, _state(states, i, END)
