@@ -205,9 +205,11 @@ def change_stiffnesses(members, row, states, segment):
         return False
     # one building after the other, and the interface before it
     for i in range(row.shape[0]):
+        # what may have to come back
         before = branch_and_maxima(row, i)
         for k in range(len(before)):
             states[i, BEFORE + k] = before[k]
+        # its step
         start, end = _state(states, i, START), _state(states, i, END)
         is_certain, end, low, high = run_changes(members, row, i, start, end, segment)
         if i > 0 and not row[i - 1, IN_CONTACT]:
