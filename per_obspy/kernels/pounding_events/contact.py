@@ -130,6 +130,7 @@ def drop_uncounted(row, log):
                 log[kept, column] = log[line, column]
             row[j, IMPACTS] += 1.0
             kept += 1
+    row[0, KEPT_LINES] = kept
 
 
 @lean
@@ -146,7 +147,6 @@ def has_room(row, log):
     # once half of what was left is used: not in every step where most lines count
     if 2 * lines > log.shape[0] + row[0, KEPT_LINES]:
         drop_uncounted(row, log)
-        row[0, KEPT_LINES] = _count_lines(row)
     return True
 
 

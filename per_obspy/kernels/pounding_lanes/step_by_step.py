@@ -195,7 +195,7 @@ def _may_join_yielding(members, row, states):
 
 
 @lean
-def _change_stiffnesses(members, row, states, segment):
+def change_stiffnesses(members, row, states, segment):
     """
     Carry a row through a step in which buildings yield or unload, each on its own.
 
@@ -205,9 +205,11 @@ def _change_stiffnesses(members, row, states, segment):
         return False
     # one building after the other, and the interface before it
     for i in range(row.shape[0]):
+        # what may have to come back
         before = branch_and_maxima(row, i)
         for k in range(len(before)):
             states[i, BEFORE + k] = before[k]
+        # its step
         start, end = _state(states, i, START), _state(states, i, END)
         is_certain, end, low, high = run_changes(members, row, i, start, end, segment)
         if i > 0 and not row[i - 1, IN_CONTACT]:
@@ -384,7 +386,7 @@ def step_row_through_tile(members, row, log, states, window, ground, count, dura
         touches = _may_touch_in_step(members, row, states, before, after, duration)
         yields = _may_yield_in_step(members, row, states)
         segment = segment_of_step(row, before, after, duration)
-        if yields and not touches and _change_stiffnesses(members, row, states, segment):
+        if yields and not touches and change_stiffnesses(members, row, states, segment):
             # each building on its own, to the end of the step
             for i in range(row.shape[0]):
                 own, end = i * STRUCTURE_ROWS, _state(states, i, END)

@@ -21,7 +21,14 @@ from per_obspy.kernels.pounding_lanes.phases import (
     write_branch,
     write_constants,
 )
-from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
+from per_obspy.kernels.pounding_lanes.step_by_step import (
+    END,
+    START,
+    STATE_COLUMNS,
+    change_stiffnesses,
+    run_events,
+    segment_of_step,
+)
 from per_obspy.pounding.kernel_tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
@@ -222,6 +229,14 @@ class TestStep:
             )
             assert_array_equal(pair, before)
             kept = [*range(columns.TAYLOR), *range(columns.TERM_COUNT, columns.ROW_COLUMNS)]
+            assert_array_equal(row[:, kept], row_before[:, kept])
+            # nor does one of a row, whose clearance closes at its start
+            row[0, columns.GAP] = pair[lanes.CONTACT_FUNCTION + 4] = start[0]
+            states = np.zeros((2, STATE_COLUMNS))
+            states[:, START : START + 3], states[:, END : END + 3] = [start, other], [end, other]
+            before, row_before = pair.copy(), row.copy()
+            assert not change_stiffnesses(pair, row, states, segment)
+            assert_array_equal(pair, before)
             assert_array_equal(row[:, kept], row_before[:, kept])
             left_alone += may_yield(pair, 0, start, end)
         assert left_alone > 20

@@ -53,6 +53,11 @@ def test_only_impacts_that_count_keep_their_lines():
     assert has_room(row, log)
     assert_array_equal(row[:, columns.IMPACTS], [1, 1, 0])
     assert_array_equal(log[:2, 1:3], [[0, 0.0015], [1, 0.5]])
+    # no search again before half of the room left is used: the line of 0.1 mm/s stays
+    log[2, 1:3] = 0, 0.0001
+    row[0, columns.IMPACTS] += 1
+    assert has_room(row, log)
+    assert_array_equal(row[:, columns.IMPACTS], [2, 1, 0])
     # the same speeds where the unit of the table is half as large
     row[0, columns.COUNTED_SPEED] = 2e-3
     drop_uncounted(row, log)
