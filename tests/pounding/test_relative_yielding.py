@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from per_obspy.pounding import relative
 from per_obspy.pounding.pair_histories import pounding_histories
 from per_obspy.pounding.relative import (
     approach,
