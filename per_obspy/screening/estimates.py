@@ -41,6 +41,7 @@ from per_obspy.screening.values import (
     Columns,
     IndexArray,
     Table,
+    TextArray,
     both,
     chosen,
     oscillators,
@@ -56,7 +57,11 @@ ROUND_OFF = 1e-12
 
 
 def demand_columns(
-    station: StationMotion, pairs: Table, motion: PairMotion, azimuth_rule: str, exact: bool
+    station: StationMotion,
+    pairs: Table,
+    motion: PairMotion,
+    azimuth_rule: str | TextArray,
+    exact: bool,
 ) -> Columns:
     """
     Compute estimates, single hit, exact outcome and governing demand of pairs at one station.
@@ -69,7 +74,7 @@ def demand_columns(
         Completed pairs.
     motion : PairMotion
         Response of the pairs to the record, along one azimuth or many.
-    azimuth_rule : str
+    azimuth_rule : str or (n_pairs,) ndarray
         Origin of the azimuth: ``given``, ``worst`` or ``station``.
     exact : bool
         Whether the exact demand and the history of every pair are computed; they are empty
@@ -93,7 +98,7 @@ def demand_columns(
     table["azimuth_rule"] = np.full(rule.size, azimuth_rule, dtype=object)
     # the exact demand replaces the estimate where the record supports it
     if exact:
-        azimuth = np.where(azimuth_rule == "station", 0.0, table["azimuth_used"])
+        azimuth = np.where(table["azimuth_rule"] == "station", 0.0, table["azimuth_used"])
         table |= exact_outcome(station, table, azimuth)
         decides = exact_decides(station, table)
     else:
