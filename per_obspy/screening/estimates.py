@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pairs.last_ductility import last_intervals
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.equivalent_linear import iwan
@@ -180,6 +181,9 @@ def single_hit_columns(table: Table, radii: Both, periods: Both) -> Columns:
 #: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
 PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
+#: Their logarithms, and what they change: logarithms of period factors, and dampings to add.
+SCAN: FloatArray = np.stack([np.log(DUCTILITIES), *iwan(DUCTILITIES, 0.0)])
+SCAN[1] = np.log(SCAN[1])
 
 #: Properties that the equivalent linear building does not share with the given one.
 EQUIVALENT = ("period", "damping", "per")
@@ -344,9 +348,13 @@ def _largest_ductility(
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
 
     # coarse scan, then a finer one of its last interval with a change of sign
-    scanned = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
-    over = excess(scanned)
-    low, high, *_ = _last_bracket(scanned, over)
+    row, period, damping = building
+    log_period, log_damping = log_period_and_damping(period, damping)
+    level = np.log(elastic) - stored_log(sd, row, log_period, log_damping)[:, 0]
+    buildings = np.stack([log_period[:, 0], damping[:, 0], level])
+    last = np.empty(elastic.size, dtype=np.int64)
+    last_intervals(*sd, row[:, 0], buildings, SCAN, last)
+    low, high = DUCTILITIES[last, None], DUCTILITIES[last + 1, None]
     finer = low + PARTS * (high - low)
     low, high, excess_low, excess_high = _last_bracket(finer, excess(finer))
     # linear interpolation between the two ends
@@ -354,7 +362,7 @@ def _largest_ductility(
     part = np.zeros_like(excess_low)
     np.divide(excess_low, excess_low - excess_high, out=part, where=crosses)
     ductility = (low + part * (high - low))[:, 0]
-    converged = np.asarray(over[:, -1] <= 0.0)
+    converged = np.asarray(excess(np.full_like(low, DUCTILITIES[-1]))[:, 0] <= 0.0)
     return np.where(converged, ductility, DUCTILITIES[-1]), converged
 
 
