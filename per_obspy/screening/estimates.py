@@ -99,7 +99,7 @@ def demand_columns(
     table["azimuth_rule"] = np.full(rule.size, azimuth_rule, dtype=object)
     # the exact demand replaces the estimate where the record supports it
     if exact:
-        azimuth = np.where(table["azimuth_rule"] == "station", 0.0, table["azimuth_used"])
+        azimuth = np.where(azimuth_rule == "station", 0.0, table["azimuth_used"])
         table |= exact_outcome(station, table, azimuth)
         decides = exact_decides(station, table)
     else:
@@ -348,12 +348,7 @@ def _largest_ductility(
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
 
     # coarse scan, then a finer one of its last interval with a change of sign
-    row, period, damping = building
-    log_period, log_damping = log_period_and_damping(period, damping)
-    level = np.log(elastic) - stored_log(sd, row, log_period, log_damping)[:, 0]
-    buildings = np.stack([log_period[:, 0], damping[:, 0], level])
-    last = np.empty(elastic.size, dtype=np.int64)
-    last_intervals(*sd, row[:, 0], buildings, SCAN, last)
+    last = _last_interval(sd, building, elastic)
     low, high = DUCTILITIES[last, None], DUCTILITIES[last + 1, None]
     finer = low + PARTS * (high - low)
     low, high, excess_low, excess_high = _last_bracket(finer, excess(finer))
@@ -364,6 +359,18 @@ def _largest_ductility(
     ductility = (low + part * (high - low))[:, 0]
     converged = np.asarray(excess(np.full_like(low, DUCTILITIES[-1]))[:, 0] <= 0.0)
     return np.where(converged, ductility, DUCTILITIES[-1]), converged
+
+
+def _last_interval(sd: LogSpectra, building: _Building, elastic: FloatArray) -> IndexArray:
+    """Return the number of the last of ``DUCTILITIES`` that the displacement exceeds, or 0."""
+    row, period, damping = building
+    log_period, log_damping = log_period_and_damping(period, damping)
+    # the stored spectrum is scaled to the displacement of the building
+    level = np.log(elastic) - stored_log(sd, row, log_period, log_damping)[:, 0]
+    buildings = np.stack([log_period[:, 0], damping[:, 0], level])
+    last = np.empty(elastic.size, dtype=np.intp)
+    last_intervals(*sd, row[:, 0], buildings, SCAN, last)
+    return last
 
 
 def _last_bracket(ductility: FloatArray, excess: FloatArray) -> tuple[FloatArray, ...]:

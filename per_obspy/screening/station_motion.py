@@ -214,16 +214,9 @@ class PairMotion(NamedTuple):
 def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
     """Compute the motion along one azimuth per pair, (n_pairs,), degrees clockwise from north."""
     period_1, damping_1, period_2, damping_2 = oscillators(pairs)
-    buildings = np.stack([period_1, damping_1, azimuth, period_2, damping_2, azimuth])
-    buildings = buildings.reshape(2, 3, -1).swapaxes(0, 1).reshape(3, -1)
-    # a building with two neighbours in its row is computed once
-    order = np.lexsort(buildings)
-    ordered = buildings[:, order]
-    is_new = np.ones(order.size, dtype=bool)
-    is_new[1:] = (ordered[:, 1:] != ordered[:, :-1]).any(axis=0)
-    largest = azimuth_maxima(*station.components, *ordered[:, is_new])
-    place = np.empty(order.size, dtype=np.intp)
-    place[order] = np.cumsum(is_new) - 1
+    first, second = (period_1, damping_1, azimuth), (period_2, damping_2, azimuth)
+    distinct, place = _distinct(np.concatenate([first, second], axis=1))
+    largest = azimuth_maxima(*station.components, *distinct)
     # every pair has one azimuth: arrays (n_pairs, 1)
     per, sd = (np.split(one[place, None], 2) for one in largest)
     return PairMotion(
@@ -232,6 +225,18 @@ def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatAr
         sd=(sd[0], sd[1]),
         correlation=_correlation(station, pairs, azimuth[:, None]),
     )
+
+
+def _distinct(buildings: FloatArray) -> tuple[FloatArray, IndexArray]:
+    """Return distinct columns, and the place of each among them: most have two neighbours."""
+    # equal ones are next to each other in this order
+    order = np.lexsort(buildings)
+    ordered = buildings[:, order]
+    is_new = np.ones(order.size, dtype=bool)
+    is_new[1:] = (ordered[:, 1:] != ordered[:, :-1]).any(axis=0)
+    place = np.empty(order.size, dtype=np.intp)
+    place[order] = np.cumsum(is_new) - 1
+    return ordered[:, is_new], place
 
 
 def motion_found(table: Table) -> PairMotion:

@@ -36,6 +36,7 @@ def last_intervals(periods, dampings, radii, rows, buildings, scan, last):
             column, along = _place(periods, column, log_period + scan[1, number])
             plane, up = _place(dampings, plane, math.log(damping + scan[2, number]))
             right, above = min(column + 1, periods.size - 1), min(plane + 1, dampings.size - 1)
+            # Stored displacement, linear in both logarithms
             lower = (1.0 - along) * stored[plane, column] + along * stored[plane, right]
             upper = (1.0 - along) * stored[above, column] + along * stored[above, right]
             if level + (1.0 - up) * lower + up * upper > scan[0, number]:
