@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pairs.last_ductility import last_intervals
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.equivalent_linear import iwan
@@ -41,6 +42,7 @@ from per_obspy.screening.values import (
     Columns,
     IndexArray,
     Table,
+    TextArray,
     both,
     chosen,
     oscillators,
@@ -56,7 +58,11 @@ ROUND_OFF = 1e-12
 
 
 def demand_columns(
-    station: StationMotion, pairs: Table, motion: PairMotion, azimuth_rule: str, exact: bool
+    station: StationMotion,
+    pairs: Table,
+    motion: PairMotion,
+    azimuth_rule: str | TextArray,
+    exact: bool,
 ) -> Columns:
     """
     Compute estimates, single hit, exact outcome and governing demand of pairs at one station.
@@ -69,7 +75,7 @@ def demand_columns(
         Completed pairs.
     motion : PairMotion
         Response of the pairs to the record, along one azimuth or many.
-    azimuth_rule : str
+    azimuth_rule : str or (n_pairs,) ndarray
         Origin of the azimuth: ``given``, ``worst`` or ``station``.
     exact : bool
         Whether the exact demand and the history of every pair are computed; they are empty
@@ -175,6 +181,9 @@ def single_hit_columns(table: Table, radii: Both, periods: Both) -> Columns:
 #: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
 PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
+#: Their logarithms, and what they change: logarithms of period factors, and dampings to add.
+SCAN: FloatArray = np.stack([np.log(DUCTILITIES), *iwan(DUCTILITIES, 0.0)])
+SCAN[1] = np.log(SCAN[1])
 
 #: Properties that the equivalent linear building does not share with the given one.
 EQUIVALENT = ("period", "damping", "per")
@@ -339,9 +348,8 @@ def _largest_ductility(
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
 
     # coarse scan, then a finer one of its last interval with a change of sign
-    scanned = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
-    over = excess(scanned)
-    low, high, *_ = _last_bracket(scanned, over)
+    last = _last_interval(sd, building, elastic)
+    low, high = DUCTILITIES[last, None], DUCTILITIES[last + 1, None]
     finer = low + PARTS * (high - low)
     low, high, excess_low, excess_high = _last_bracket(finer, excess(finer))
     # linear interpolation between the two ends
@@ -349,8 +357,20 @@ def _largest_ductility(
     part = np.zeros_like(excess_low)
     np.divide(excess_low, excess_low - excess_high, out=part, where=crosses)
     ductility = (low + part * (high - low))[:, 0]
-    converged = np.asarray(over[:, -1] <= 0.0)
+    converged = np.asarray(excess(np.full_like(low, DUCTILITIES[-1]))[:, 0] <= 0.0)
     return np.where(converged, ductility, DUCTILITIES[-1]), converged
+
+
+def _last_interval(sd: LogSpectra, building: _Building, elastic: FloatArray) -> IndexArray:
+    """Return the number of the last of ``DUCTILITIES`` that the displacement exceeds, or 0."""
+    row, period, damping = building
+    log_period, log_damping = log_period_and_damping(period, damping)
+    # the stored spectrum is scaled to the displacement of the building
+    level = np.log(elastic) - stored_log(sd, row, log_period, log_damping)[:, 0]
+    buildings = np.stack([log_period[:, 0], damping[:, 0], level])
+    last = np.empty(elastic.size, dtype=np.intp)
+    last_intervals(*sd, row[:, 0], buildings, SCAN, last)
+    return last
 
 
 def _last_bracket(ductility: FloatArray, excess: FloatArray) -> tuple[FloatArray, ...]:

@@ -48,6 +48,7 @@ from per_obspy.screening.station_motion import (
     StationMotion,
     motion_along_azimuths,
     motion_along_every_azimuth,
+    motion_found,
     motion_of_one_horizontal,
     station_motion,
 )
@@ -214,12 +215,14 @@ def _not_less_by_assumption(
     It is that of linear buildings there, up to the smallest of the next state.
     """
     probability, smallest = values(table, "probability").copy(), screening.states.unlikely
-    # the same pairs again, as if they stayed linear
+    # the same pairs under the same motion again, as if they stayed linear
     is_assumed = np.any(strength_is_assumed(pairs), axis=0)
     rows = np.flatnonzero(is_assumed & (probability < smallest))
     if rows.size:
-        block = chosen(pairs, rows)
-        linear = _demands(station, block | stay_linear(block), screening)
+        block, found = chosen(pairs, rows), chosen(table, rows)
+        motion, azimuth_rule = motion_found(found), found["azimuth_rule"]
+        pairs = block | stay_linear(block)
+        linear = demand_columns(station, pairs, motion, azimuth_rule, screening.exact)
         chance = record_population(station, linear, screening)["probability"]
         probability[rows] = np.maximum(probability[rows], np.minimum(chance, smallest))
     return probability

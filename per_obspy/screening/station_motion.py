@@ -214,14 +214,38 @@ class PairMotion(NamedTuple):
 def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
     """Compute the motion along one azimuth per pair, (n_pairs,), degrees clockwise from north."""
     period_1, damping_1, period_2, damping_2 = oscillators(pairs)
-    per_1, sd_1 = azimuth_maxima(*station.components, period_1, damping_1, azimuth)
-    per_2, sd_2 = azimuth_maxima(*station.components, period_2, damping_2, azimuth)
+    first, second = (period_1, damping_1, azimuth), (period_2, damping_2, azimuth)
+    distinct, place = _distinct(np.concatenate([first, second], axis=1))
+    largest = azimuth_maxima(*station.components, *distinct)
     # every pair has one azimuth: arrays (n_pairs, 1)
+    per, sd = (np.split(one[place, None], 2) for one in largest)
     return PairMotion(
         azimuth=azimuth[:, None],
-        per=(per_1[:, None], per_2[:, None]),
-        sd=(sd_1[:, None], sd_2[:, None]),
+        per=(per[0], per[1]),
+        sd=(sd[0], sd[1]),
         correlation=_correlation(station, pairs, azimuth[:, None]),
+    )
+
+
+def _distinct(buildings: FloatArray) -> tuple[FloatArray, IndexArray]:
+    """Return distinct columns, and the place of each among them: most have two neighbours."""
+    # equal ones are next to each other in this order
+    order = np.lexsort(buildings)
+    ordered = buildings[:, order]
+    is_new = np.ones(order.size, dtype=bool)
+    is_new[1:] = (ordered[:, 1:] != ordered[:, :-1]).any(axis=0)
+    place = np.empty(order.size, dtype=np.intp)
+    place[order] = np.cumsum(is_new) - 1
+    return ordered[:, is_new], place
+
+
+def motion_found(table: Table) -> PairMotion:
+    """Return the motion along the azimuth used of pairs whose demand was computed."""
+    return PairMotion(
+        azimuth=values(table, "azimuth_used")[:, None],
+        per=(values(table, "per_1")[:, None], values(table, "per_2")[:, None]),
+        sd=(values(table, "sd_1")[:, None], values(table, "sd_2")[:, None]),
+        correlation=values(table, "correlation_record")[:, None],
     )
 
 

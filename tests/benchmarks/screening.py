@@ -5,8 +5,11 @@ Run: ``python tests/benchmarks/screening.py [PAIRS...]``, 10 000 and 100 000 if 
 Linux. The pairs surround the 24 simulated stations of the demonstration, which is the first run.
 Each inventory is screened with estimates only, and up to a million pairs with the exact
 demand and history of each. Seconds are by the clock, of screening with ranking, of the report, and
-of the whole command from its start; processor time is that of all processes; memory is the largest
-sum over all processes (proportional set size: shared memory counts once).
+of the whole command from its start; processor time is that of all processes, and that of the client
+apart: the process of the command, which joins what the tasks of the others make. ``further`` is the
+time of a pair more than in the smaller inventory before, in us of processor time, tasks and client:
+``screening.py 200000 600000`` repeats the slopes of ``docs/scaling.md``. Memory is the largest sum
+over all processes (proportional set size: shared memory counts once).
 """
 
 import ctypes
@@ -51,7 +54,7 @@ exact = {exact}
 """
 HEADER = (
     f"{'pairs':>10} {'way':9} {'screening':>9} {'report':>7} {'whole':>7} "
-    f"{'processors':>10} {'memory':>9} per pair"
+    f"{'processors':>10} {'client':>8} {'memory':>9} per pair  further: tasks, client"
 )
 
 
@@ -108,7 +111,7 @@ def await_orphans() -> None:
 
 
 def measured(configuration: Path) -> dict[str, float]:
-    """Run the command; return its wall and processor seconds, and its memory in bytes."""
+    """Run the command; return its wall and processor seconds, its client's, and memory in bytes."""
     adopt_orphans()
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     command = [sys.executable, "-m", "per_obspy", "run", str(configuration)]
@@ -116,15 +119,18 @@ def measured(configuration: Path) -> dict[str, float]:
     with said.open("w") as log:
         process = subprocess.Popen(command, stdout=log, stderr=log)
     most = 0
-    while process.poll() is None:
+    # Asked as its parent, which learns the processor time of this process alone
+    while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:
         most = max(most, memory(process.pid))
         time.sleep(1.0)  # looking at large processes stops them for a moment
+    process.returncode = os.waitstatus_to_exitcode(ended[1])
     whole = time.perf_counter() - start
     await_orphans()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert process.returncode == 0, said.read_text()
     processors = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {"whole": whole, "processors": processors, "memory": most}
+    client = ended[2].ru_utime + ended[2].ru_stime
+    return {"whole": whole, "processors": processors, "client": client, "memory": most}
 
 
 def main(sizes: list[int]) -> None:
@@ -142,6 +148,7 @@ def main(sizes: list[int]) -> None:
         note("demonstration, peak memory", found["memory"] / 1e9, "GB")
         print(f"demonstration: {found['processors']:.1f} s of processor time, {remark}")
         print(HEADER)
+        smaller = dict[str, tuple[int, dict[str, float]]]()
         for count in sizes:
             write_inventory(pairs, count, output / "stations")
             for exact in ("false", "true") if count <= EXACT else ("false",):
@@ -149,7 +156,17 @@ def main(sizes: list[int]) -> None:
                 configuration.write_text(RECORDS + PAIRS.format(exact=exact))
                 found = measured(configuration)
                 seconds = json.loads((output / "run.json").read_text())["seconds"]
-                print(_row(count, exact, seconds, found), flush=True)
+                further = _further(count, found, *smaller[exact]) if exact in smaller else ""
+                print(_row(count, exact, seconds, found) + further, flush=True)
+                smaller[exact] = count, found
+
+
+def _further(count: int, found: dict[str, float], fewer: int, before: dict[str, float]) -> str:
+    """Return the processor time of tasks and client for a pair more than in another inventory."""
+    client, whole = (
+        (found[name] - before[name]) / (count - fewer) * 1e6 for name in ("client", "processors")
+    )
+    return f" {whole - client:6.1f} {client:6.1f} us"
 
 
 def _row(count: int, exact: str, seconds: dict[str, float], found: dict[str, float]) -> str:
@@ -161,7 +178,8 @@ def _row(count: int, exact: str, seconds: dict[str, float], found: dict[str, flo
     return (
         f"{count:10} {way:9} {seconds['screening']:7.1f} s {seconds['report']:5.1f} s "
         f"{found['whole']:5.1f} s"
-        f" {found['processors']:8.1f} s {found['memory'] / 1e6:6.0f} MB {each:4.0f} us"
+        f" {found['processors']:8.1f} s {found['client']:6.1f} s"
+        f" {found['memory'] / 1e6:6.0f} MB {each:4.0f} us"
     )
 
 
