@@ -60,10 +60,17 @@ def requested_run(
     # A configuration, as it is or with changes
     if second is None and (file := _configuration(first)):
         line = "" if file == Path(first) else f"configuration: {file}"
-        if not changed:
+        if not changed and output is None:
             return Request(file, line)
-        content = merged(read_toml(file), changed)
-        return Request(checked(Run, content, f"{file} and --set", file.resolve().parent), line)
+        given = read_toml(file)
+        content = merged(given, changed)
+        # The folder of the command takes the place of a missing one
+        if output is not None:
+            content.setdefault("output", str(output.absolute()))
+        if content == given:
+            return Request(file, line)
+        source = f"{file} and --set" if changed else str(file)
+        return Request(checked(Run, content, source, file.resolve().parent), line)
     # Records and pairs
     records, pairs = _roles(first, second, changed)
     pairs = pairs and str(_one_table(pairs))

@@ -1,5 +1,7 @@
 """Interpretation of ``per-obspy run A B``, and messages where an input is missing."""
 
+from pathlib import Path
+
 import pytest
 
 from per_obspy.errors import CatalogError
@@ -114,6 +116,12 @@ def test_a_configuration_alone_is_taken_as_before(desk):
     assert settings.output == desk / "out"
     assert settings.records.folder == desk / "records"
     assert not settings.screening.exact
+    # the folder of the command does for one that is not named, and leaves others alone
+    assert requested_run("run.toml", None, Path("else")).configuration.name == "run.toml"
+    without = "".join(line for line in RUN.splitlines(True) if not line.startswith("output"))
+    (desk / "run.toml").write_text(without)
+    settings = requested_run("run.toml", None, Path("else")).configuration
+    assert (settings.output, settings.records.folder) == (desk / "else", desk / "records")
 
 
 @pytest.mark.parametrize(
