@@ -56,7 +56,12 @@ ROUND_OFF = 1e-12
 
 
 def demand_columns(
-    station: StationMotion, pairs: Table, motion: PairMotion, azimuth_rule: str, exact: bool
+    station: StationMotion,
+    pairs: Table,
+    motion: PairMotion,
+    azimuth_rule: str,
+    exact: bool,
+    histories: bool = True,
 ) -> Columns:
     """
     Compute estimates, single hit, exact outcome and governing demand of pairs at one station.
@@ -71,9 +76,9 @@ def demand_columns(
         Response of the pairs to the record, along one azimuth or many.
     azimuth_rule : str
         Origin of the azimuth: ``given``, ``worst`` or ``station``.
-    exact : bool
-        Whether the exact demand and the history of every pair are computed; they are empty
-        otherwise.
+    exact, histories : bool
+        Whether the exact demand of every pair, and with it its history, are computed; they are
+        empty otherwise.
 
     Returns
     -------
@@ -94,7 +99,7 @@ def demand_columns(
     # the exact demand replaces the estimate where the record supports it
     if exact:
         azimuth = np.where(azimuth_rule == "station", 0.0, table["azimuth_used"])
-        table |= exact_outcome(station, table, azimuth)
+        table |= exact_outcome(station, table, azimuth, histories)
         decides = exact_decides(station, table)
     else:
         table |= no_outcome(rule.size)
