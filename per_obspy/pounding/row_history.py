@@ -101,8 +101,9 @@ def closure_of(energies: Energies) -> float:
 #: Impacts within one sampling interval after which structures that are pressed together stay in
 #: contact.
 BOUNCES_OF_ROWS = 100_000
-#: Impacts for which there is room at first.
-FIRST_ROOM = 1000
+#: Impacts for which there is room at first: touching pairs have some thousands, and room that is
+#: not used costs no memory.
+FIRST_ROOM = 8192
 #: Columns of the kernels' log of impacts.
 LOGGED = [
     "time",

@@ -115,7 +115,7 @@ def page_drawings(
     workers = near(workers, len(chosen))
     # Sensitivities take longest
     calls = [
-        *_varied(chosen, ground, settings, workers.count),
+        *_varied(chosen, ground, settings, max(workers.count - 1, 1)),
         *_followed(worst, stations),
         *(_drawn(worst, stations) if any(counts) else ()),
     ]
@@ -136,9 +136,10 @@ def _with_sensitivity(worst: pd.DataFrame) -> tuple[pd.DataFrame, tuple[int, int
     return chosen, (min(len(known), WORST), len(doubt))
 
 
-def _joined(calls: Iterable[Callable[[], Drawings]]) -> Drawings:
+def _joined(calls: Sequence[Callable[[], Drawings]]) -> Drawings:
     """Return what some calls draw; pairs in the order of their ranks, whoever drew them."""
-    parts = [call() for call in calls]
+    # The last ones have not begun: this process does them meanwhile
+    parts = [call() for call in reversed(calls)][::-1]
     return Drawings(
         dict(chain.from_iterable(part.stations.items() for part in parts)),
         dict(sorted(chain.from_iterable(part.histories.items() for part in parts))),

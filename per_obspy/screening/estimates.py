@@ -63,6 +63,7 @@ def demand_columns(
     motion: PairMotion,
     azimuth_rule: str | TextArray,
     exact: bool,
+    histories: bool = True,
 ) -> Columns:
     """
     Compute estimates, single hit, exact outcome and governing demand of pairs at one station.
@@ -77,9 +78,9 @@ def demand_columns(
         Response of the pairs to the record, along one azimuth or many.
     azimuth_rule : str or (n_pairs,) ndarray
         Origin of the azimuth: ``given``, ``worst`` or ``station``.
-    exact : bool
-        Whether the exact demand and the history of every pair are computed; they are empty
-        otherwise.
+    exact, histories : bool
+        Whether the exact demand of every pair, and with it its history, are computed; they are
+        empty otherwise.
 
     Returns
     -------
@@ -100,7 +101,7 @@ def demand_columns(
     # the exact demand replaces the estimate where the record supports it
     if exact:
         azimuth = np.where(azimuth_rule == "station", 0.0, table["azimuth_used"])
-        table |= exact_outcome(station, table, azimuth)
+        table |= exact_outcome(station, table, azimuth, histories)
         decides = exact_decides(station, table)
     else:
         table |= no_outcome(rule.size)

@@ -116,9 +116,13 @@ def _yields(pairs: Table) -> BoolArray:
     return np.asarray((displacement > CERTAINLY_ELASTIC * limit).any(axis=0))
 
 
-def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> Columns:
+def exact_outcome(
+    station: StationMotion, table: Table, azimuth: FloatArray, histories: bool = True
+) -> Columns:
     """
     Compute exact relative displacements and pounding histories of a block of pairs.
+
+    Without ``histories`` all columns but the demands are empty.
 
     ``azimuth`` is that of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
     Pairs whose azimuth is unknown are turned by 180 degrees where the demand is larger there.
@@ -133,6 +137,9 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     driven = np.where(turned, azimuth + 180.0, azimuth)
     outcome = {"azimuth_used": np.where(turned, (axis + 180.0) % 360.0, axis)}
     outcome |= {"demand_exact": demand, "demand_two_sided": np.maximum(towards, away)}
+    # The demands alone
+    if not histories:
+        return no_outcome(demand.size) | outcome
     radii, residual = np.stack(others[:2]), np.stack(others[2:])
     outcome |= _pounding_columns(station, table, driven, demand, radii, residual)
     return outcome | _residual_columns(residual, table, record_supports(station, table))

@@ -4,7 +4,7 @@ Rows of the risk table, not ranked yet, and the table of an inventory that fits 
 A row depends on its pair, its station and the settings, and on no other row.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -103,6 +103,34 @@ def risk_rows(
     rejected : tuple of Rejection
         Pairs that neither a station, amplitudes nor the map serve.
     """
+    rows, rejected = _rows(pairs, ground, building, screening, _record_columns)
+    return _ordered(rows.reindex(columns=[*ORDER]) if rows.empty else rows), rejected
+
+
+def contact_chances(
+    pairs: pd.DataFrame, ground: RegionalMotion, building: Building, screening: Screening
+) -> pd.DataFrame:
+    """
+    Return ``pair_id, probability, state`` of the rows of :func:`risk_rows`, in less time.
+
+    Neither histories nor measures are computed, which change none of them.
+    """
+    rows, _ = _rows(pairs, ground, building, screening, _chance_columns)
+    return rows.reindex(columns=["pair_id", "probability", "state"])
+
+
+#: Computes columns of pairs at one station.
+_AtStation = Callable[[xr.Dataset, Columns, Screening], Columns]
+
+
+def _rows(
+    pairs: pd.DataFrame,
+    ground: RegionalMotion,
+    building: Building,
+    screening: Screening,
+    at_station: _AtStation,
+) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """Return one row per pair, with the columns of its station, and the rejected pairs."""
     complete = kept_apart(completed_pairs(_without_results(pairs), building))
     placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
     tables = []
@@ -111,15 +139,16 @@ def risk_rows(
         rows, placed, rejected = _by_amplitudes(complete, placed, rejected, ground, screening)
         tables += [rows] if len(rows) else []
     if len(placed):
-        tables.append(_rows_at_stations(placed.reset_index(drop=True), ground, screening))
+        rows = _rows_at_stations(placed.reset_index(drop=True), ground, screening, at_station)
+        tables.append(rows)
     # pairs without a station in reach fall back on the map
     if ground.shakemap is not None and rejected:
         rest = complete[complete["pair_id"].isin([rejection.name for rejection in rejected])]
         mapped, rejected = shakemap_rows(ground.shakemap, rest, screening, rejected)
         tables += [mapped] if len(mapped) else []
     if not tables:
-        return _ordered(placed.reindex(columns=[*ORDER])), rejected
-    return _ordered(without_gap(pd.concat(tables, ignore_index=True))), rejected
+        return placed[:0], rejected
+    return without_gap(pd.concat(tables, ignore_index=True)), rejected
 
 
 def _by_amplitudes(
@@ -158,7 +187,7 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _rows_at_stations(
-    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening
+    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening, at_station: _AtStation
 ) -> pd.DataFrame:
     index = pairs["station_index"].to_numpy(np.int64)
     if ground.field is not None:
@@ -173,7 +202,7 @@ def _rows_at_stations(
     for number in np.unique(index).tolist():
         rows = np.flatnonzero(index == number)
         block = chosen(known, rows)
-        parts.append((rows, _record_columns(ground.stations.read(number), block, screening)))
+        parts.append((rows, at_station(ground.stations.read(number), block, screening)))
     # All at once: columns that are inserted one by one fragment a table
     columns = pd.DataFrame(joined(parts), index=pairs.index)
     return _with_states_and_flags(pd.concat([pairs, columns], axis=1), screening)
@@ -181,11 +210,8 @@ def _rows_at_stations(
 
 def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
     """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
-    station = station_motion(dataset)
-    given = pairs
-    # No azimuth of a pair is one of sensors that point nobody knows where
-    if lacks_azimuths(dataset):
-        pairs = pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
+    station, given = station_motion(dataset), pairs
+    pairs = _as_recorded(dataset, pairs)
     table = _demands(station, pairs, screening)
     # measures, flags and population follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
@@ -196,12 +222,34 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     return {name: column for name, column in table.items() if name not in given}
 
 
-def _demands(station: StationMotion, pairs: Columns, screening: Screening) -> Columns:
+def _chance_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
+    """Compute the columns that need the record of a station and decide the chance of contact."""
+    station, given = station_motion(dataset), pairs
+    pairs = _as_recorded(dataset, pairs)
+    table = _demands(station, pairs, screening, histories=False)
+    table |= record_population(station, table, screening)
+    table["probability"] = _not_less_by_assumption(station, pairs, table, screening)
+    # Measures that flags are read from
+    nothing = np.full(len(table["gap"]), np.nan)
+    table |= dict.fromkeys(("supplemental_damping", "bumper_restitution"), nothing)
+    return {name: column for name, column in table.items() if name not in given}
+
+
+def _as_recorded(dataset: xr.Dataset, pairs: Columns) -> Columns:
+    """Return pairs without azimuth where sensors point nobody knows where."""
+    if not lacks_azimuths(dataset):
+        return pairs
+    return pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
+
+
+def _demands(
+    station: StationMotion, pairs: Columns, screening: Screening, histories: bool = True
+) -> Columns:
     """Compute the demand, by groups of pairs whose azimuth is found alike."""
     parts = []
     for rows, motion, azimuth_rule in _motions(station, pairs, screening.exact):
         group = chosen(pairs, rows)
-        demands = demand_columns(station, group, motion, azimuth_rule, screening.exact)
+        demands = demand_columns(station, group, motion, azimuth_rule, screening.exact, histories)
         parts.append((rows, demands))
     return joined(parts)
 
@@ -222,7 +270,9 @@ def _not_less_by_assumption(
         block, found = chosen(pairs, rows), chosen(table, rows)
         motion, azimuth_rule = motion_found(found), found["azimuth_rule"]
         pairs = block | stay_linear(block)
-        linear = demand_columns(station, pairs, motion, azimuth_rule, screening.exact)
+        linear = demand_columns(
+            station, pairs, motion, azimuth_rule, screening.exact, histories=False
+        )
         chance = record_population(station, linear, screening)["probability"]
         probability[rows] = np.maximum(probability[rows], np.minimum(chance, smallest))
     return probability

@@ -21,7 +21,7 @@ from per_obspy.screening.population import (
     one_wall_chance,
 )
 from per_obspy.screening.ranking import kept_apart
-from per_obspy.screening.risk import risk_rows
+from per_obspy.screening.risk import contact_chances
 from per_obspy.screening.site_motion import RegionalMotion
 from per_obspy.screening.values import BoolArray, values
 
@@ -88,8 +88,8 @@ def input_sensitivity(
     if not inputs:
         return []
     # Rows are compared with themselves: of other settings they have other probabilities
-    found, _ = risk_rows(_variants(known, inputs), ground, building, screening)
-    by_name = found.set_index("pair_id")[["probability", "state"]]
+    found = contact_chances(_variants(known, inputs), ground, building, screening)
+    by_name = found.set_index("pair_id")
     same = _same(known, by_name)
     return [
         outcome

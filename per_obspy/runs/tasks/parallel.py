@@ -194,12 +194,13 @@ def begun(calls: Sequence[partial[Result]], workers: Workers) -> Iterator[list[p
     """
     Begin some calls in other processes; the block receives calls that wait for the results.
 
-    A call whose process dies is done by this one.
+    This process is one of the workers: it does a call that is asked for before it has begun, and
+    one whose process died. Whoever asks for the last calls first waits least.
     """
     if workers.count < 2:
         yield [*calls]
         return
-    with _Pool(workers.count) as pool:
+    with _Pool(workers.count - 1) as pool:
         yield [partial(_awaited, _submitted(pool, call), call) for call in calls]
 
 
@@ -214,7 +215,7 @@ def _submitted(pool: Executor, call: partial[Result]) -> Future[Result] | None:
 def _awaited(future: Future[Result] | None, call: partial[Result]) -> Result:
     """Return the result of a call that was begun, or else do it."""
     try:
-        return future.result() if future else call()
+        return call() if future is None or future.cancel() else future.result()
     except BrokenExecutor:
         return call()
 

@@ -85,6 +85,10 @@ def test_calls_are_begun_in_other_processes_and_none_is_lost():
     calls = [partial(eval, f"{here} or {DIES}"), partial(isqrt, 16), partial(isqrt, 25)]
     with begun(calls, Workers(2)) as waiting:
         assert [call() for call in waiting] == [True, 4, 5]
+    # this process does not wait for calls that no other has begun
+    calls = [partial(eval, "__import__('time').sleep(0.5)")] * 3 + [partial(eval, here)] * 3
+    with begun(calls, Workers(2)) as waiting:
+        assert [call() for call in reversed(waiting)] == [True] * 3 + [None] * 3
 
 
 SLEEPS = """
