@@ -3,7 +3,7 @@ Speed of the estimates of a pair, next to plain NumPy and pandas in one process 
 
     python tests/benchmarks/pair_estimates.py
 
-Times are processor time of this thread, the best of several. The peers do the three steps of the
+Times are processor time of all threads, the best of several. The peers do the three steps of the
 single hit for one branch, without status, envelope and energies: less than what they are compared
 with.
 """
@@ -32,9 +32,9 @@ def best(work: Callable[[], object], repeats: int = 5) -> float:
     work()
     times = []
     for _ in range(repeats):
-        start = time.thread_time()
+        start = time.process_time()
         work()
-        times.append(time.thread_time() - start)
+        times.append(time.process_time() - start)
     return min(times)
 
 

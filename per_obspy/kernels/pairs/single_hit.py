@@ -15,7 +15,8 @@ import math
 import numpy as np
 
 from per_obspy.kernels._aligned import aligned_copy
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import inlined, kernel
+from per_obspy.kernels.vector_functions import TO_INTEGER
 
 #: Pairs of a block: its arrays stay in the first-level cache.
 PAIRS = 32
@@ -155,7 +156,7 @@ def _load(arguments, first, pairs, states, sign, constants):
 def _sine_products(phase):
     """Return sin² and sin·cos of half the phase, by Taylor series to rounding, without branches."""
     # Reduce by whole turns; a quarter of the rest is below pi/4
-    turns = math.floor(phase * TURNS_PER_RADIAN + 0.5)
+    turns = (phase * TURNS_PER_RADIAN + TO_INTEGER) - TO_INTEGER
     y = 0.25 * (phase - turns * TURN - turns * TURN_REMAINDER)
     z = y * y
     # Sine and cosine of the quarter
@@ -252,15 +253,16 @@ def _radii(given, fields):
     for body in range(2):
         field = 6 * body
         for pair in range(PAIRS):
+            radius_before = given[body, pair]
             before, after = fields[2 + field, pair], fields[3 + field, pair]
             # Radius after the impact
             shifted = after / given[2 + body, pair]
             radius = math.sqrt(fields[1 + field, pair] ** 2 + shifted * shifted)
-            resting = radius == 0.0 and given[body, pair] == 0.0
+            resting = radius == 0.0 and radius_before == 0.0
             # Impulse J: the transfer energy, eq. (9) and (10), is J (v + v_after) / 2
             impulse = given[6, pair] * (fields[2, pair] - fields[8, pair]) * (1.0 - 2.0 * body)
             fields[4 + field, pair] = radius
-            fields[5 + field, pair] = 1.0 if resting else radius / given[body, pair]
+            fields[5 + field, pair] = 1.0 if resting else radius / radius_before
             fields[6 + field, pair] = impulse * 0.5 * (before + after)
 
 
@@ -298,24 +300,26 @@ def _largest_radius(arguments, body, first, pairs, bounds):
 
 @kernel
 def _scan(constants, peaks):
-    """Fill phases (two rows) and heights (two rows) of the two highest peaks of the scan."""
+    """Fill nodes (two rows) and heights (two rows) of the two highest peaks of the scan."""
     # Two more rows: heights at two phases
     c, p = aligned_copy(constants, 7, PAIRS), np.zeros((6, PAIRS))
     for pair in range(PAIRS):
         p[5, pair] = _radius_squared(c, pair, SCAN_PHASES[0])
     for node in range(SCAN_PHASES.size):
-        y, following = SCAN_PHASES[node], SCAN_PHASES[min(node + 1, SCAN_PHASES.size - 1)]
+        following = SCAN_PHASES[min(node + 1, SCAN_PHASES.size - 1)]
         for pair in range(PAIRS):
             # A peak is at least as high as its neighbours
             left, middle = p[4, pair], p[5, pair]
             right = _radius_squared(c, pair, following)
             height = middle if middle >= left and middle >= right else 0.0
-            # Insert it among the two highest
-            highest, second = height > p[2, pair], height > p[3, pair]
-            p[3, pair] = p[2, pair] if highest else (height if second else p[3, pair])
-            p[1, pair] = p[0, pair] if highest else (y if second else p[1, pair])
-            p[2, pair] = height if highest else p[2, pair]
-            p[0, pair] = y if highest else p[0, pair]
+            # Insert it among the two highest; all are read first: reads that depend on a condition
+            # make no vectors
+            node_1, node_2, height_1, height_2 = p[0, pair], p[1, pair], p[2, pair], p[3, pair]
+            highest, second = height > height_1, height > height_2
+            p[3, pair] = height_1 if highest else (height if second else height_2)
+            p[1, pair] = node_1 if highest else (node if second else node_2)
+            p[2, pair] = height if highest else height_1
+            p[0, pair] = node if highest else node_1
             p[4, pair], p[5, pair] = middle, right
     for row in range(4):
         for pair in range(PAIRS):
@@ -330,7 +334,7 @@ def _refine(constants, peaks):
     for peak in range(2):
         # Bracket between the neighbouring phases, and its two inner points
         for pair in range(PAIRS):
-            node = np.searchsorted(SCAN_PHASES, peaks[peak, pair])
+            node = int(peaks[peak, pair])
             left[pair] = SCAN_PHASES[max(node - 1, 0)]
             right[pair] = SCAN_PHASES[min(node + 1, SCAN_PHASES.size - 1)]
             inner[0, pair] = right[pair] - GOLDEN * (right[pair] - left[pair])
@@ -339,12 +343,15 @@ def _refine(constants, peaks):
             outer[1, pair] = _radius_squared(c, pair, outer[0, pair])
         for _ in range(SECTIONS):
             for pair in range(PAIRS):
-                # The part of the bracket with the higher point, which stays
-                keep_left = inner[1, pair] > outer[1, pair]
-                low = left[pair] if keep_left else inner[0, pair]
-                high = outer[0, pair] if keep_left else right[pair]
-                staying_phase = inner[0, pair] if keep_left else outer[0, pair]
-                staying_height = inner[1, pair] if keep_left else outer[1, pair]
+                # The part of the bracket with the higher point, which stays (all are read first)
+                low, high = left[pair], right[pair]
+                inner_phase, inner_height = inner[0, pair], inner[1, pair]
+                outer_phase, outer_height = outer[0, pair], outer[1, pair]
+                keep_left = inner_height > outer_height
+                low = low if keep_left else inner_phase
+                high = outer_phase if keep_left else high
+                staying_phase = inner_phase if keep_left else outer_phase
+                staying_height = inner_height if keep_left else outer_height
                 # The new point
                 phase = high - GOLDEN * (high - low) if keep_left else low + GOLDEN * (high - low)
                 height = _radius_squared(c, pair, phase)
@@ -382,7 +389,7 @@ def _load_bound(arguments, body, first, pairs, constants):
         constants[6, pair] = share if touching else 0.0
 
 
-@kernel
+@inlined
 def _radius_squared(constants, pair, y):
     """Return the squared radius after contact at the phase y in [-1, 1]."""
     # Contact displacement; the polynomial is flat at both ends, as a cosine would be
