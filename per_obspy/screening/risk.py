@@ -5,6 +5,7 @@ A row depends on its pair, its station and the settings, and on no other row.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -46,10 +47,10 @@ from per_obspy.screening.station_amplitudes import (
 from per_obspy.screening.station_motion import (
     PairMotion,
     StationMotion,
+    joined_stations,
     motion_along_azimuths,
     motion_along_every_azimuth,
     motion_of_one_horizontal,
-    station_motion,
 )
 from per_obspy.screening.values import (
     Columns,
@@ -72,6 +73,10 @@ INTERMEDIATE = (
     "motion_from_other_site_class",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
+
+#: Pairs from which on those of the next station are no longer computed with those of the ones
+#: before, and stations at most whose pairs are computed together.
+TOGETHER, STATIONS_TOGETHER = 1000, 64
 
 #: Pairs of unknown azimuth that are computed together: at 180 azimuths every array of theirs stays
 #: below 3 MB.
@@ -167,32 +172,78 @@ def _rows_at_stations(
     for name in pairs:
         if name == "derived" or is_numeric_dtype(pairs[name]):
             known[str(name)] = pairs[name].to_numpy()
-    # one station after the other
+    # some stations after the other
     parts = []
-    for number in np.unique(index).tolist():
-        rows = np.flatnonzero(index == number)
-        block = chosen(known, rows)
-        parts.append((rows, _record_columns(ground.stations.read(number), block, screening)))
+    for served in _served_together(index, ground):
+        rows = np.concatenate([one.rows for one in served])
+        parts.append((rows, _record_columns(served, chosen(known, rows), screening)))
     # All at once: columns that are inserted one by one fragment a table
     columns = pd.DataFrame(joined(parts), index=pairs.index)
     return _with_states_and_flags(pd.concat([pairs, columns], axis=1), screening)
 
 
-def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
-    """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
-    station = station_motion(dataset)
-    given = pairs
+class _Served(NamedTuple):
+    """A station and the rows of its pairs."""
+
+    dataset: xr.Dataset
+    motion: StationMotion
+    rows: IndexArray
+
+
+def _served_together(index: IndexArray, ground: RegionalMotion) -> Iterator[list[_Served]]:
+    """Yield stations whose pairs are computed together: a call of NumPy on few takes as long."""
+    order, numbers = np.argsort(index, kind="stable"), np.unique(index)
+    starts = np.searchsorted(index[order], numbers)
+    together = list[_Served]()
+    for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
+        one = _Served(ground.stations.read(number), ground.stations.motion(number), rows)
+        if together and not _goes_with(one, together):
+            yield together
+            together = []
+        together.append(one)
+    yield together
+
+
+def _goes_with(one: _Served, together: Sequence[_Served]) -> bool:
+    """Return whether the pairs of a station are computed with those of others."""
+    first, count = together[0].motion, sum(other.rows.size for other in together)
+    few = count < TOGETHER and len(together) < STATIONS_TOGETHER
+    are_two = one.motion.horizontals == first.horizontals == 2
+    return few and are_two and one.motion.grid == first.grid
+
+
+def _record_columns(served: Sequence[_Served], pairs: Columns, screening: Screening) -> Columns:
+    """
+    Compute the columns that need the records of stations, flags as booleans ``raised_...``.
+
+    Pairs are those of the first station, then those of the second and so on.
+    """
+    station = joined_stations([one.motion for one in served])
+    given, counts = pairs, [one.rows.size for one in served]
     # No azimuth of a pair is one of sensors that point nobody knows where
-    if lacks_azimuths(dataset):
-        pairs = pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
+    lacking = np.repeat([lacks_azimuths(one.dataset) for one in served], counts)
+    pairs = pairs | {
+        "azimuth": np.where(lacking, np.nan, pairs["azimuth"]),
+        "station_index": np.repeat(np.arange(len(served)), counts),
+    }
     table = _demands(station, pairs, screening)
     # measures, flags and population follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
-    raised = raised_by_record(table, dataset, screening)
+    raised = _raised(served, table, screening)
     table |= record_population(station, table, screening)
     table["probability"] = _not_less_by_assumption(station, pairs, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in given}
+
+
+def _raised(served: Sequence[_Served], table: Columns, screening: Screening) -> Columns:
+    """Return a mask of rows per flag of the records, whose pairs follow each other."""
+    parts, first = [], 0
+    for dataset, _, rows in served:
+        own = {name: column[first : first + rows.size] for name, column in table.items()}
+        parts.append(raised_by_record(own, dataset, screening))
+        first += rows.size
+    return {flag: np.concatenate([part[flag] for part in parts]) for flag in parts[0]}
 
 
 def _demands(station: StationMotion, pairs: Columns, screening: Screening) -> Columns:
