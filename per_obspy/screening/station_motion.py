@@ -213,6 +213,7 @@ def by_record(
     """
     if len(station.records) == 1:
         return compute(station.records[0], *columns)
+    # each with its own rows
     number, parts = record_number(station, pairs), list[tuple[IndexArray, FloatArray]]()
     for one in np.unique(number).tolist():
         rows = np.flatnonzero(number == one)
@@ -315,6 +316,7 @@ def _along_azimuths(
     azimuth: FloatArray,
 ) -> FloatArray:
     """Return PER and SD of buildings 1, of buildings 2, and correlation, (5, n_pairs, 1)."""
+    # one call for both buildings, whose results are parted again
     radii = azimuth_maxima(
         *record.components,
         np.concatenate([period_1, period_2]),
