@@ -103,6 +103,7 @@ def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejecti
         else:
             reasons = ("its coordinates are unknown: it serves no pair",)
             rejections.append(Rejection("station", station["station"].item(), "", None, reasons))
+    # a station is decoded at its first use
     stations = Stations(
         names=np.array([station["station"].item() for station in located], dtype=object),
         longitude=np.array([number(station, "longitude") for station in located]),

@@ -194,6 +194,7 @@ def _served_together(index: IndexArray, ground: RegionalMotion) -> Iterator[list
     """Yield stations whose pairs are computed together: a call of NumPy on few takes as long."""
     order, numbers = np.argsort(index, kind="stable"), np.unique(index)
     starts = np.searchsorted(index[order], numbers)
+    # in the order of their numbers
     together = list[_Served]()
     for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
         one = _Served(ground.stations.read(number), ground.stations.motion(number), rows)
@@ -240,10 +241,12 @@ def _raised(served: Sequence[_Served], table: Columns, screening: Screening) -> 
     """Return a mask of rows per flag of the records, whose pairs follow each other."""
     parts, first = [], 0
     for dataset, _, rows in served:
-        own = {name: column[first : first + rows.size] for name, column in table.items()}
-        parts.append(raised_by_record(own, dataset, screening))
-        first += rows.size
-    return {flag: np.concatenate([part[flag] for part in parts]) for flag in parts[0]}
+        # views of its own rows
+        own = slice(first, first + rows.size)
+        some = {name: column[own] for name, column in table.items()}
+        parts.append((np.arange(own.start, own.stop), raised_by_record(some, dataset, screening)))
+        first = own.stop
+    return joined(parts)
 
 
 def _demands(station: StationMotion, pairs: Columns, screening: Screening) -> Columns:

@@ -185,6 +185,7 @@ def joined_stations(stations: Sequence[StationMotion]) -> StationMotion:
     first, *others = stations
     if not others:
         return first
+    # rows of one station after those of the one before
     spectra = {}
     for name in ("per", "sd", "per_rotd50"):
         radii = np.concatenate([getattr(station, name).radii for station in stations])
