@@ -105,7 +105,7 @@ def real_stations(cache: Path) -> Iterator[tuple[str, xr.Dataset]]:
 
 def compared(event: str, station: xr.Dataset) -> Iterator[pd.DataFrame]:
     """Yield ln(estimate / exact) of pairs whose periods are usable in the record."""
-    motion = station_motion(station)
+    motion = station_motion(station).records[0]
     shortest, longest = motion.usable_periods
     periods = np.geomspace(max(SHORTEST, shortest), LONGEST, PERIODS)
     period_1, ratio = (column.ravel() for column in np.meshgrid(periods, RATIOS))
@@ -206,7 +206,7 @@ def page(rows: pd.DataFrame) -> Iterator[str]:
 
 def impacts(event: str, station: xr.Dataset, number: int) -> pd.DataFrame:
     """Return exact histories of made-up pairs at a station, and what a node knows of them."""
-    motion, random = station_motion(station), np.random.default_rng(number)
+    motion, random = station_motion(station).records[0], np.random.default_rng(number)
     shortest, longest = motion.usable_periods
     # nearly equal, alike and any periods, the longer ones usable
     spread = random.choice([0.1, 0.4, 1.0], HISTORIES)
@@ -222,7 +222,7 @@ def impacts(event: str, station: xr.Dataset, number: int) -> pd.DataFrame:
     azimuth = random.uniform(0.0, 360.0, count)
     oscillators = periods[0], dampings[0], periods[1], dampings[1]
     free = approach(*motion.components, *oscillators, azimuth)
-    record = np.stack([motion.north, motion.east])
+    record = motion.horizontal
     pairs = [column for i in (0, 1) for column in (periods[i], dampings[i], masses[i])]
     given = {"restitution": restitution, "azimuth": azimuth}
     hit, apart = (

@@ -130,10 +130,23 @@ def directional_correlation(
 
     with c = c1 + c2. For white noise (U = 0, V the same for both) its normalised form is eq. (16).
     """
+    products = sample_products(*both_components(north, east))
+    step = checks.number("dt", dt, checks.positive)
+    return correlation_along(products, step, period_1, damping_1, period_2, damping_2, azimuths)
+
+
+def correlation_along(
+    products: tuple[FloatArray, FloatArray],
+    dt: float,
+    period_1: ArrayLike,
+    damping_1: ArrayLike,
+    period_2: ArrayLike,
+    damping_2: ArrayLike,
+    azimuths: ArrayLike,
+) -> FloatArray:
+    """Return :func:`directional_correlation` from the :func:`sample_products` of a record."""
     pairs = Pairs.of(period_1=period_1, damping_1=damping_1, period_2=period_2, damping_2=damping_2)
-    angle = np.radians(checks.finite("azimuths", azimuths))
-    components = both_components(north, east)
-    return _correlations(components, checks.number("dt", dt, checks.positive), pairs, angle)
+    return _correlations(products, dt, pairs, np.radians(checks.finite("azimuths", azimuths)))
 
 
 def worst_azimuth(
@@ -199,13 +212,15 @@ def worst_azimuth(
     return azimuth
 
 
-def _correlations(components: FloatArray, dt: float, pairs: Pairs, angle: FloatArray) -> FloatArray:
+def _correlations(
+    products: tuple[FloatArray, FloatArray], dt: float, pairs: Pairs, angle: FloatArray
+) -> FloatArray:
     """
     Return the correlations of pairs along angles (rad), (n_pairs, n_angles).
 
     By the formula in the notes of :func:`directional_correlation`.
     """
-    work, power = _input_work(components, dt, pairs, angle)
+    work, power = _input_work(products, dt, pairs, angle)
     omega, damping = pairs.frequency[..., np.newaxis], pairs.damping[..., np.newaxis]
 
     # Undamped oscillators vibrate for ever: their correlation is known without integrals
@@ -236,14 +251,14 @@ def _covariance(
 
 
 def _input_work(
-    components: FloatArray, dt: float, pairs: Pairs, angle: FloatArray
+    products: tuple[FloatArray, FloatArray], dt: float, pairs: Pairs, angle: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return U = ∫ u a dt and V = ∫ v a dt of both structures, (2, n_pairs, n_angles) each."""
     # Run the record once through all oscillators
     frequency, damping = pairs.frequency.ravel(), pairs.damping.ravel()
     order = np.argsort(frequency * damping, kind="stable")
     moments = np.empty((order.size, 2, 3))
-    input_moments(*_sample_products(*components), dt, frequency, damping, order, moments)
+    input_moments(*products, dt, frequency, damping, order, moments)
 
     # Moments of north with north, of north with east, and of east with east
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -252,7 +267,7 @@ def _input_work(
     return work, power
 
 
-def _sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:
+def sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return sums of products of two samples, and products with the first sample, by their distance.
 
@@ -326,6 +341,6 @@ def record_correlation(
     pairs = Pairs.of(period_1=period_1, damping_1=damping_1, period_2=period_2, damping_2=damping_2)
 
     # One component: the record is that along north, and so is the axis of every pair
-    components = np.stack([record, np.zeros_like(record)])
+    products = sample_products(record, np.zeros_like(record))
     step = checks.number("dt", dt, checks.positive)
-    return _correlations(components, step, pairs, np.zeros((1, 1)))[:, 0].reshape(pairs.shape)
+    return _correlations(products, step, pairs, np.zeros((1, 1)))[:, 0].reshape(pairs.shape)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from math import inf, pi, prod
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,9 +119,11 @@ class Pairs:
         fields = {}
         for name in PAIR_CHECKS:
             names = [f"{name}_1", f"{name}_2"] if name in _CHECKS else [name]
-            rows = [np.broadcast_to(checked[one], shape).ravel() for one in names if one in checked]
-            default = np.broadcast_to(_DEFAULTS.get(name, 0.0), (len(names), prod(shape)))
-            lines = np.stack(rows) if rows else default
+            lines = np.empty((len(names), *shape))
+            # broadcast by the assignment, which is faster; an absent argument has its default
+            for line, one in enumerate(names):
+                lines[line, ...] = checked.get(one, _DEFAULTS.get(name, 0.0))
+            lines = lines.reshape(len(names), -1)
             fields[name] = lines if name in _CHECKS else lines[0]
         return cls(shape, **fields)
 

@@ -1,6 +1,7 @@
 """Assignment of a station to each pair: the nearest on its site class, else the nearest."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
+from per_obspy.screening.station_motion import StationMotion, station_motion
 from per_obspy.screening.values import BoolArray, IndexArray, TextArray, number, values
 
 
@@ -79,6 +81,8 @@ class Stations(NamedTuple):
         Site class of the ground; empty if unknown.
     read : callable
         Function that returns the Dataset of a station, given its index.
+    motion : callable
+        Likewise its motion, decoded once.
     """
 
     names: TextArray
@@ -86,6 +90,7 @@ class Stations(NamedTuple):
     latitude: FloatArray
     site_class: TextArray
     read: Callable[[int], xr.Dataset]
+    motion: Callable[[int], StationMotion]
 
 
 def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejection, ...]]:
@@ -98,12 +103,14 @@ def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejecti
         else:
             reasons = ("its coordinates are unknown: it serves no pair",)
             rejections.append(Rejection("station", station["station"].item(), "", None, reasons))
+    # a station is decoded at its first use
     stations = Stations(
         names=np.array([station["station"].item() for station in located], dtype=object),
         longitude=np.array([number(station, "longitude") for station in located]),
         latitude=np.array([number(station, "latitude") for station in located]),
         site_class=np.array([site_class_of(station) for station in located], dtype=object),
         read=located.__getitem__,
+        motion=cache(lambda index: station_motion(located[index])),
     )
     return stations, tuple(rejections)
 

@@ -23,7 +23,6 @@ from per_obspy.kernels.pairs.last_ductility import last_intervals
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.equivalent_linear import iwan
-from per_obspy.pounding.linearization import NARROW, record_bandwidth
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.flags import period_is_derived
@@ -34,6 +33,7 @@ from per_obspy.screening.station_motion import (
     StationMotion,
     log_period_and_damping,
     nearest_azimuth,
+    record_number,
     stored_log,
 )
 from per_obspy.screening.values import (
@@ -295,8 +295,10 @@ def _yielding_columns(station: StationMotion, table: Table) -> Columns:
     first, second = (_equivalent(station, row, table, i) for i in (1, 2))
     # eq. (16) of the equivalent buildings; in narrow motion at most the elastic one
     correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
-    if record_bandwidth(*station.components) < NARROW:
-        correlation = np.minimum(correlation, values(table, "correlation"))
+    of_record = record_number(station, table)
+    narrow = np.array([record.is_narrow for record in station.records])[of_record]
+    smaller = np.minimum(correlation, values(table, "correlation"))
+    correlation = np.where(narrow, smaller, correlation)
     # eq. (15) with the PER of the equivalent buildings at contact level
     share_1, share_2 = both(table, "participation")
     columns: Columns = {

@@ -24,7 +24,7 @@ from per_obspy.pounding.relative import (
     yielding_relative_displacement,
 )
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.station_motion import StationMotion
+from per_obspy.screening.station_motion import Record, StationMotion, by_record, record_number
 from per_obspy.screening.values import (
     BoolArray,
     Both,
@@ -63,16 +63,19 @@ AXES: FloatArray = np.arange(0.0, 360.0, 12.0)
 
 #: Columns from which the approach of a pair follows.
 OSCILLATORS = [
-    f"{name}_{i}"
-    for name in ("period", "damping", "participation", "yield_displacement", "hardening")
-    for i in (1, 2)
+    "station_index",
+    *(
+        f"{name}_{i}"
+        for name in ("period", "damping", "participation", "yield_displacement", "hardening")
+        for i in (1, 2)
+    ),
 ]
 
 
 def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
     """Return the axis from 1 to 2 along which the record demands the largest gap, degrees."""
-    shares = both(pairs, "participation")
-    azimuth = worst_azimuth(*station.components, *oscillators(pairs), *shares)
+    columns = *oscillators(pairs), *both(pairs, "participation")
+    azimuth: FloatArray = by_record(station, pairs, _worst_azimuth, columns)[0]
     # one of the axes, of buildings that yield
     weak = np.flatnonzero(can_yield(pairs))
     if weak.size:
@@ -80,6 +83,11 @@ def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
         every = chosen(only(pairs, OSCILLATORS), np.tile(weak, AXES.size))
         approaches = exact_approach(station, every, along).displacement.reshape(AXES.size, -1)
         azimuth[weak] = AXES[approaches.argmax(axis=0)]
+    return azimuth
+
+
+def _worst_azimuth(record: Record, *columns: FloatArray) -> FloatArray:
+    azimuth: FloatArray = worst_azimuth(*record.components, *columns)[None]
     return azimuth
 
 
@@ -100,7 +108,8 @@ def record_supports(station: StationMotion, pairs: Table) -> BoolArray:
     It must hold both periods in its usable range and both horizontals.
     """
     periods = np.stack(both(pairs, "period"))
-    shortest, longest = station.usable_periods
+    usable_periods = np.array([record.usable_periods for record in station.records])
+    shortest, longest = usable_periods[record_number(station, pairs)].T
     usable = ((periods >= shortest) & (periods <= longest)).all(axis=0)
     return np.asarray(usable & (station.horizontals == 2))
 
@@ -203,38 +212,47 @@ def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) ->
     relative, yields = np.empty((2, azimuth.size)), can_yield(table)
     # linear pairs take the shorter computation
     if not yields.all():
-        arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
-        relative[:, ~yields] = approach(*station.components, *arguments)
+        pairs = chosen(table, ~yields)
+        columns = _arguments(pairs, azimuth[~yields])
+        relative[:, ~yields] = by_record(station, pairs, _linear_approach, columns)
     if yields.any():
         pairs = chosen(table, yields)
-        record = np.stack([station.north, station.east]), station.dt
-        arguments = _arguments(pairs, azimuth[yields])
-        relative[:, yields] = yielding_approach(*record, *arguments, **_strengths(pairs))
+        columns = *_arguments(pairs, azimuth[yields]), *_strengths(pairs)
+        relative[:, yields] = by_record(station, pairs, _yielding_approach, columns)
     return Approach(*relative)
+
+
+def _linear_approach(record: Record, *columns: FloatArray) -> FloatArray:
+    return np.stack(approach(*record.components, *columns))
+
+
+def _yielding_approach(record: Record, *columns: FloatArray) -> FloatArray:
+    return np.stack(yielding_approach(record.horizontal, record.dt, *columns))
 
 
 def pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -> PoundingMaxima:
     """Return the maxima of the pounding histories, at contact level."""
-    (mass_1, mass_2), (share_1, share_2) = both(table, "contact_mass"), both(table, "participation")
+    (mass_1, mass_2), shares = both(table, "contact_mass"), both(table, "participation")
     period_1, damping_1, period_2, damping_2 = oscillators(table)
     # bilinear oscillators in order 1, 2; an infinite yield displacement is a linear one
-    maxima: PoundingMaxima = pounding_histories(
-        np.stack([station.north, station.east]),
-        station.dt,
-        period_1,
-        damping_1,
-        mass_1,
-        period_2,
-        damping_2,
-        mass_2,
-        gap=values(table, "gap"),
-        restitution=values(table, "restitution"),
-        participation_1=share_1,
-        participation_2=share_2,
-        azimuth=azimuth,
-        **_strengths(table),
+    columns = (
+        *(period_1, damping_1, mass_1, period_2, damping_2, mass_2),
+        *(values(table, "gap"), values(table, "restitution"), *shares, azimuth),
+        *_strengths(table),
     )
-    return maxima
+    found = by_record(station, table, _histories, columns)
+    return PoundingMaxima(
+        per=found[:2],
+        displacement_maxima=found[2:4],
+        impacts=found[4].astype(np.int64),
+        impact_velocity=found[5],
+        residual=found[6:],
+    )
+
+
+def _histories(record: Record, *columns: Any) -> FloatArray:
+    """Return the fields of the maxima as rows, (8, n_pairs)."""
+    return np.vstack(pounding_histories(record.horizontal, record.dt, *columns))
 
 
 def _without_contact(
@@ -251,21 +269,25 @@ def _without_contact(
     free = np.zeros((6, azimuth.size))
     free[2:4] = at_contact(table, "per")
     if not yields.all():
-        arguments = _arguments(chosen(table, ~yields), azimuth[~yields])
-        linear = directional_relative_displacement(*station.components, *arguments)
-        free[:2, ~yields] = linear.one_before_two, linear.two_before_one
+        pairs = chosen(table, ~yields)
+        columns = _arguments(pairs, azimuth[~yields])
+        free[:2, ~yields] = by_record(station, pairs, _linear_demands, columns)
     if yields.any():
         # PER of the yielding oscillators
         pairs = chosen(table, yields)
-        bilinear = yielding_relative_displacement(
-            np.stack([station.north, station.east]),
-            station.dt,
-            *_arguments(pairs, azimuth[yields]),
-            **_strengths(pairs),
-        )
-        demands = bilinear.one_before_two, bilinear.two_before_one
-        free[:, yields] = *demands, *bilinear.per, *bilinear.residual
+        columns = *_arguments(pairs, azimuth[yields]), *_strengths(pairs)
+        free[:, yields] = by_record(station, pairs, _yielding_response, columns)
     return free
+
+
+def _linear_demands(record: Record, *columns: FloatArray) -> FloatArray:
+    linear = directional_relative_displacement(*record.components, *columns)
+    return np.stack([linear.one_before_two, linear.two_before_one])
+
+
+def _yielding_response(record: Record, *columns: FloatArray) -> FloatArray:
+    found = yielding_relative_displacement(record.horizontal, record.dt, *columns)
+    return np.stack([found.one_before_two, found.two_before_one, *found.per, *found.residual])
 
 
 def _arguments(pairs: Table, azimuth: FloatArray) -> tuple[FloatArray, ...]:
@@ -273,13 +295,11 @@ def _arguments(pairs: Table, azimuth: FloatArray) -> tuple[FloatArray, ...]:
     return *oscillators(pairs), azimuth, *both(pairs, "participation")
 
 
-def _strengths(pairs: Table) -> dict[str, Any]:
-    """Return yield displacement, m, and hardening of both buildings; NaN of linear ones."""
-    strengths = {}
-    for i, yields in enumerate(at_contact(pairs, "yield_displacement"), start=1):
-        strengths[f"yield_displacement_{i}"] = yields
-        strengths[f"hardening_{i}"] = values(pairs, f"hardening_{i}")
-    return strengths
+def _strengths(pairs: Table) -> tuple[FloatArray, ...]:
+    """Return yield displacement, m, and hardening of building 1, then of 2."""
+    yields_1, yields_2 = at_contact(pairs, "yield_displacement")
+    hardening_1, hardening_2 = both(pairs, "hardening")
+    return yields_1, hardening_1, yields_2, hardening_2
 
 
 #: Step of the scan over the added damping, fraction of critical.
@@ -293,7 +313,7 @@ TOGETHER = 32
 
 #: Columns from which the exact demand follows.
 NEEDED = (
-    *("azimuth", "gap"),
+    *("azimuth", "gap", "station_index"),
     *(
         f"{name}_{i}"
         for name in ("period", "damping", "participation", "per", "yield_displacement", "hardening")

@@ -100,6 +100,7 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 #: Columns of a pair from which its demand at the site and its history follow.
 PAIR = (
     *("gap", "restitution", "contact_log_std", "azimuth", "azimuth_used", "distance"),
+    "station_index",
     *("ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2"),
 )
 

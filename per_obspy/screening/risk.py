@@ -5,6 +5,7 @@ A row depends on its pair, its station and the settings, and on no other row.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -46,11 +47,11 @@ from per_obspy.screening.station_amplitudes import (
 from per_obspy.screening.station_motion import (
     PairMotion,
     StationMotion,
+    joined_stations,
     motion_along_azimuths,
     motion_along_every_azimuth,
     motion_found,
     motion_of_one_horizontal,
-    station_motion,
 )
 from per_obspy.screening.values import (
     Columns,
@@ -73,6 +74,10 @@ INTERMEDIATE = (
     "motion_from_other_site_class",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
+
+#: Pairs from which on those of the next station are no longer computed with those of the ones
+#: before, and stations at most whose pairs are computed together.
+TOGETHER, STATIONS_TOGETHER = 1000, 64
 
 #: Pairs of unknown azimuth that are computed together: at 180 azimuths every array of theirs stays
 #: below 3 MB.
@@ -119,8 +124,16 @@ def contact_chances(
     return rows.reindex(columns=["pair_id", "probability", "state"])
 
 
-#: Computes columns of pairs at one station.
-_AtStation = Callable[[xr.Dataset, Columns, Screening], Columns]
+class _Served(NamedTuple):
+    """A station and the rows of its pairs."""
+
+    dataset: xr.Dataset
+    motion: StationMotion
+    rows: IndexArray
+
+
+#: Computes columns of pairs at some stations.
+_AtStations = Callable[[Sequence[_Served], Columns, Screening], Columns]
 
 
 def _rows(
@@ -128,7 +141,7 @@ def _rows(
     ground: RegionalMotion,
     building: Building,
     screening: Screening,
-    at_station: _AtStation,
+    at_stations: _AtStations,
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """Return one row per pair, with the columns of its station, and the rejected pairs."""
     complete = kept_apart(completed_pairs(_without_results(pairs), building))
@@ -139,7 +152,7 @@ def _rows(
         rows, placed, rejected = _by_amplitudes(complete, placed, rejected, ground, screening)
         tables += [rows] if len(rows) else []
     if len(placed):
-        rows = _rows_at_stations(placed.reset_index(drop=True), ground, screening, at_station)
+        rows = _rows_at_stations(placed.reset_index(drop=True), ground, screening, at_stations)
         tables.append(rows)
     # pairs without a station in reach fall back on the map
     if ground.shakemap is not None and rejected:
@@ -187,7 +200,7 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _rows_at_stations(
-    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening, at_station: _AtStation
+    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening, at_stations: _AtStations
 ) -> pd.DataFrame:
     index = pairs["station_index"].to_numpy(np.int64)
     if ground.field is not None:
@@ -197,35 +210,59 @@ def _rows_at_stations(
     for name in pairs:
         if name == "derived" or is_numeric_dtype(pairs[name]):
             known[str(name)] = pairs[name].to_numpy()
-    # one station after the other
+    # some stations after the other
     parts = []
-    for number in np.unique(index).tolist():
-        rows = np.flatnonzero(index == number)
-        block = chosen(known, rows)
-        parts.append((rows, at_station(ground.stations.read(number), block, screening)))
+    for served in _served_together(index, ground):
+        rows = np.concatenate([one.rows for one in served])
+        parts.append((rows, at_stations(served, chosen(known, rows), screening)))
     # All at once: columns that are inserted one by one fragment a table
     columns = pd.DataFrame(joined(parts), index=pairs.index)
     return _with_states_and_flags(pd.concat([pairs, columns], axis=1), screening)
 
 
-def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
-    """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
-    station, given = station_motion(dataset), pairs
-    pairs = _as_recorded(dataset, pairs)
+def _served_together(index: IndexArray, ground: RegionalMotion) -> Iterator[list[_Served]]:
+    """Yield stations whose pairs are computed together: a call of NumPy on few takes as long."""
+    order, numbers = np.argsort(index, kind="stable"), np.unique(index)
+    starts = np.searchsorted(index[order], numbers)
+    # in the order of their numbers
+    together = list[_Served]()
+    for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
+        one = _Served(ground.stations.read(number), ground.stations.motion(number), rows)
+        if together and not _goes_with(one, together):
+            yield together
+            together = []
+        together.append(one)
+    yield together
+
+
+def _goes_with(one: _Served, together: Sequence[_Served]) -> bool:
+    """Return whether the pairs of a station are computed with those of others."""
+    first, count = together[0].motion, sum(other.rows.size for other in together)
+    few = count < TOGETHER and len(together) < STATIONS_TOGETHER
+    are_two = one.motion.horizontals == first.horizontals == 2
+    return few and are_two and one.motion.grid == first.grid
+
+
+def _record_columns(served: Sequence[_Served], pairs: Columns, screening: Screening) -> Columns:
+    """
+    Compute the columns that need the records of stations, flags as booleans ``raised_...``.
+
+    Pairs are those of the first station, then those of the second and so on.
+    """
+    given, (station, pairs) = pairs, _joined(served, pairs)
     table = _demands(station, pairs, screening)
     # measures, flags and population follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
-    raised = raised_by_record(table, dataset, screening)
+    raised = _raised(served, table, screening)
     table |= record_population(station, table, screening)
     table["probability"] = _not_less_by_assumption(station, pairs, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in given}
 
 
-def _chance_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
-    """Compute the columns that need the record of a station and decide the chance of contact."""
-    station, given = station_motion(dataset), pairs
-    pairs = _as_recorded(dataset, pairs)
+def _chance_columns(served: Sequence[_Served], pairs: Columns, screening: Screening) -> Columns:
+    """Compute the columns that need records and decide the chance of contact; pairs as above."""
+    given, (station, pairs) = pairs, _joined(served, pairs)
     table = _demands(station, pairs, screening, histories=False)
     table |= record_population(station, table, screening)
     table["probability"] = _not_less_by_assumption(station, pairs, table, screening)
@@ -235,11 +272,28 @@ def _chance_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     return {name: column for name, column in table.items() if name not in given}
 
 
-def _as_recorded(dataset: xr.Dataset, pairs: Columns) -> Columns:
-    """Return pairs without azimuth where sensors point nobody knows where."""
-    if not lacks_azimuths(dataset):
-        return pairs
-    return pairs | {"azimuth": np.full(len(pairs["azimuth"]), np.nan)}
+def _joined(served: Sequence[_Served], pairs: Columns) -> tuple[StationMotion, Columns]:
+    """Return stations as one, and their pairs with the number of the station of each."""
+    counts = [one.rows.size for one in served]
+    # No azimuth of a pair is one of sensors that point nobody knows where
+    lacking = np.repeat([lacks_azimuths(one.dataset) for one in served], counts)
+    known = {
+        "azimuth": np.where(lacking, np.nan, pairs["azimuth"]),
+        "station_index": np.repeat(np.arange(len(served)), counts),
+    }
+    return joined_stations([one.motion for one in served]), pairs | known
+
+
+def _raised(served: Sequence[_Served], table: Columns, screening: Screening) -> Columns:
+    """Return a mask of rows per flag of the records, whose pairs follow each other."""
+    parts, first = [], 0
+    for dataset, _, rows in served:
+        # views of its own rows
+        own = slice(first, first + rows.size)
+        some = {name: column[own] for name, column in table.items()}
+        parts.append((np.arange(own.start, own.stop), raised_by_record(some, dataset, screening)))
+        first = own.stop
+    return joined(parts)
 
 
 def _demands(

@@ -29,6 +29,7 @@ from per_obspy.screening.station_motion import (
     StationMotion,
     log_oscillator,
     nearest_azimuth,
+    record_number,
     stored_log,
 )
 from per_obspy.screening.values import (
@@ -208,7 +209,7 @@ def _stored_radius(station: StationMotion, table: Table, i: int, row: IndexArray
     stored = np.empty(row.size)
     # whole tables first, which need no choice
     for mask, spectra, rows in (
-        (given, station.per_rotd50, np.zeros_like(row)),
+        (given, station.per_rotd50, record_number(station, table)),
         (~given, station.per, row),
     ):
         if mask.all():

@@ -72,7 +72,7 @@ def _stations(*classes):
         np.array([0.01, 0.05]),
         np.zeros(2),
         np.array(classes, dtype=object),
-        lambda _: pytest.fail("no record is needed"),
+        *2 * (lambda _: pytest.fail("no record is needed"),),
     )
 
 
@@ -119,7 +119,7 @@ def test_coordinates_that_would_reach_a_station_if_exchanged_are_suspected():
         np.array([7.68]),
         np.array([45.08]),
         np.array([""], dtype=object),
-        lambda _: None,
+        *2 * (lambda _: None,),
     )
     table, rejected = assigned(pairs, turin, 20e3)
     assert table.empty
@@ -142,7 +142,7 @@ def test_pairs_that_would_reach_a_station_with_another_sign_are_suspected():
         np.array([-67.95]),
         np.array([-20.31]),
         np.array([""], dtype=object),
-        lambda _: None,
+        *2 * (lambda _: None,),
     )
     _, rejected = assigned(pairs, uyuni, 20e3)
     reasons = [rejection.reasons[0].partition("; ")[2] for rejection in rejected]

@@ -140,8 +140,8 @@ class TestYieldingPairs:
         share_1, share_2 = row["participation_1"], row["participation_2"]
         # oscillators at contact level along 30 degrees
         free = yielding_relative_displacement(
-            np.stack([motion.north, motion.east]),
-            motion.dt,
+            motion.records[0].horizontal,
+            motion.records[0].dt,
             row["period_1"],
             row["damping_1"],
             row["period_2"],

@@ -28,11 +28,13 @@ def _table(station, share=0.75, **columns):
 def _demands(record, table, added=0.0, azimuth=40.0):
     """Return the largest u1 - u2 at contact level of each pair along an azimuth, by row, m."""
     angle = np.radians(azimuth)
-    along = record.north * np.cos(angle) + record.east * np.sin(angle)
+    along = record.records[0].north * np.cos(angle) + record.records[0].east * np.sin(angle)
     shares = table["participation_1"], table["participation_2"]
     dampings = table["damping_1"] + added, table["damping_2"] + added
     oscillators = table["period_1"], dampings[0], table["period_2"], dampings[1]
-    return per_obspy.relative_displacement(along, record.dt, *oscillators, *shares).one_before_two
+    return per_obspy.relative_displacement(
+        along, record.records[0].dt, *oscillators, *shares
+    ).one_before_two
 
 
 @pytest.mark.parametrize("share", [0.9, 0.75, 0.65])
@@ -107,7 +109,7 @@ def test_a_weak_building_is_followed_beyond_its_yield(station, record):
     weak = {"yield_displacement_1": 0.02, "hardening_1": 0.05}
     table = table_of(station, [{"period_1": 1.0, "period_2": 0.6, "azimuth": 40.0} | weak])
     angle = np.radians(40.0)
-    along = record.north * np.cos(angle) + record.east * np.sin(angle)
+    along = record.records[0].north * np.cos(angle) + record.records[0].east * np.sin(angle)
 
     shares = float(table["participation_1"][0]), float(table["participation_2"][0])
     strength = {"yield_displacement_1": 0.02 * shares[0], "hardening_1": 0.05}
@@ -116,7 +118,12 @@ def test_a_weak_building_is_followed_beyond_its_yield(station, record):
         motion = np.stack([along, np.zeros_like(along)])
         oscillators = 1.0, 0.05 + added, 0.6, 0.05 + added, 0.0
         found = yielding_relative_displacement(
-            motion, record.dt, *oscillators, *shares, **strength, yield_displacement_2=np.inf
+            motion,
+            record.records[0].dt,
+            *oscillators,
+            *shares,
+            **strength,
+            yield_displacement_2=np.inf,
         )
         return float(found.one_before_two)
 

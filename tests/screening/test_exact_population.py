@@ -85,7 +85,14 @@ def test_nearly_equal_buildings_are_as_uncertain_as_they_are(sct):
     random, count = np.random.default_rng(6), 4000
     damping_1, damping_2 = 0.05 * np.exp(0.3 * random.normal(size=(2, count)))
     drawn = directional_relative_displacement(
-        motion.north, motion.east, motion.dt, 0.5, damping_1, 0.52, damping_2, 90.0
+        motion.records[0].north,
+        motion.records[0].east,
+        motion.records[0].dt,
+        0.5,
+        damping_1,
+        0.52,
+        damping_2,
+        90.0,
     ).one_before_two
     # standard error of a deviation of 128 nodes: 6 %
     assert_allclose(spread, np.log(drawn).std(), rtol=0.15)
@@ -105,7 +112,8 @@ def test_impact_velocities_at_sct_are_those_of_histories(sct, periods, share):
     motion, random, count = station_motion(sct), np.random.default_rng(4), 800
     drawn = np.array(periods)[:, None] * np.exp(0.2 * random.normal(size=(2, count)))
     hit = per_obspy.pounding_histories(
-        np.stack([motion.north, motion.east]), motion.dt, drawn[0], 0.05, 1e6, drawn[1], 0.05, 1e6,
+        motion.records[0].horizontal, motion.records[0].dt,
+        drawn[0], 0.05, 1e6, drawn[1], 0.05, 1e6,
         gap=np.full(count, gap), restitution=row["restitution"], azimuth=np.full(count, 90.0),
     )  # fmt: skip
     # 447 pairs on 15 real records: half within 6 %, nine in ten within 17 %; this record, almost
@@ -197,7 +205,14 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     # only period 1 varies
     nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.eye(9)[0]
     demand = directional_relative_displacement(
-        record.north, record.east, record.dt, 2.0 * np.exp(0.2 * nodes[:, 0]), 0.05, 1.5, 0.05, 30.0
+        record.records[0].north,
+        record.records[0].east,
+        record.records[0].dt,
+        2.0 * np.exp(0.2 * nodes[:, 0]),
+        0.05,
+        1.5,
+        0.05,
+        30.0,
     ).one_before_two
     _, motion_log_std = pair_at_site(at_site)
     random, count = np.random.default_rng(2), 200_000
@@ -301,7 +316,7 @@ def test_an_uncertain_strength_is_that_of_drawn_histories(station):
     motion, random, count = station_motion(station), np.random.default_rng(8), 2000
     strength = pair["yield_displacement_1"] * np.exp(0.8 * random.normal(size=count))
     hit = per_obspy.pounding_histories(
-        np.stack([motion.north, motion.east]), motion.dt, 0.8, 0.05, 1e6, 1.3, 0.05, 1e6,
+        motion.records[0].horizontal, motion.records[0].dt, 0.8, 0.05, 1e6, 1.3, 0.05, 1e6,
         gap=np.full(count, pair["gap"]), restitution=0.65,
         azimuth=np.full(count, table["azimuth_used"].iloc[1]), yield_displacement_1=strength,
         hardening_1=0.1,
@@ -326,7 +341,7 @@ def test_touching_buildings_that_yield_are_not_in_step(sct):
     for pair, (_, found) in zip(rows, _table(sct, rows).iterrows(), strict=True):
         scatter = np.exp(0.2 * random.normal(size=(2, 300)))
         hit = per_obspy.pounding_histories(
-            np.stack([motion.north, motion.east]), motion.dt,
+            motion.records[0].horizontal, motion.records[0].dt,
             pair["period_1"] * scatter[0], 0.05, 1e6, pair["period_2"] * scatter[1], 0.05, 1e6,
             gap=0.0, restitution=found["restitution"], azimuth=np.full(300, found["azimuth_used"]),
             **{name: pair[name] for name in pair if name.startswith(("yield", "hardening"))},

@@ -99,11 +99,13 @@ def test_against_the_record_itself(record, table):
     # catches: the spectrum of another azimuth or building
     table = table.assign(gap=0.85 * table["demand"])
     added = mitigation_columns(record, table, TARGET)["supplemental_damping"]
-    along = record.north * np.cos(np.radians(40.0)) + record.east * np.sin(np.radians(40.0))
+    along = record.records[0].north * np.cos(np.radians(40.0)) + record.records[0].east * np.sin(
+        np.radians(40.0)
+    )
     for damping, row in zip(0.05 + added, table.to_dict("records"), strict=True):
         periods = row["period_1"], row["period_2"]
         # the record drives each building with its participation
-        per_1, per_2 = per_obspy.per_spectrum(along, record.dt, periods, damping)
+        per_1, per_2 = per_obspy.per_spectrum(along, record.records[0].dt, periods, damping)
         radii = row["participation_1"] * per_1, row["participation_2"] * per_2
         correlation = per_obspy.ddc_correlation(periods[0], damping, periods[1], damping)
         # three dampings and 60 periods are stored, interpolated linearly on logarithmic axes

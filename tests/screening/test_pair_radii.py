@@ -33,10 +33,12 @@ def along(record):
 def test_radii_are_those_of_the_turned_record(record, along):
     # would catch: buildings, dampings or the sense of the azimuth exchanged
     for index, azimuth in enumerate(np.radians(PAIRS["azimuth"])):
-        turned = record.north * np.cos(azimuth) + record.east * np.sin(azimuth)
+        turned = record.records[0].north * np.cos(azimuth) + record.records[0].east * np.sin(
+            azimuth
+        )
         for i in (1, 2):
             period, damping = PAIRS[f"period_{i}"][index], PAIRS[f"damping_{i}"][index]
-            spectra = per_obspy.response_spectra(turned, record.dt, [period], damping)
+            spectra = per_obspy.response_spectra(turned, record.records[0].dt, [period], damping)
             # the contract of the spectra
             assert_allclose(along.per[i - 1][index], spectra.per, rtol=1e-9)
             assert_allclose(along.sd[i - 1][index], spectra.sd, rtol=1e-9)
@@ -77,5 +79,5 @@ def test_a_single_horizontal_serves_along_its_own_azimuth():
     record = station_motion(make_station(channels=("HNE",)))
     motion = motion_of_one_horizontal(record, PAIRS)
     assert_array_equal(motion.azimuth, np.full((4, 1), 90.0))
-    spectra = per_obspy.response_spectra(record.north, record.dt, [0.4], 0.02)
+    spectra = per_obspy.response_spectra(record.records[0].north, record.records[0].dt, [0.4], 0.02)
     assert_allclose(motion.per[0][1], spectra.per, rtol=1e-9)

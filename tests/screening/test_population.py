@@ -168,7 +168,8 @@ def test_draws_of_exact_histories(station, record):
     random, count = np.random.default_rng(3), 3000
     period_1, period_2 = np.exp(0.2 * random.normal(size=(2, count))) * [[1.0], [0.8]]
     hit = per_obspy.pounding_histories(
-        np.stack([record.north, record.east]), record.dt, period_1, 0.05, 1e6, period_2, 0.05, 1e6,
+        record.records[0].horizontal, record.records[0].dt,
+        period_1, 0.05, 1e6, period_2, 0.05, 1e6,
         gap=np.full(count, 0.3), restitution=0.65, azimuth=np.full(count, 30.0),
     )  # fmt: skip
     # P of 128 nodes is within 0.021 of 4096 at 95 of 100 pairs; the velocity fit within 25 % a node

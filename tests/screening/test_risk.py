@@ -195,6 +195,32 @@ def test_the_nearest_station_is_used_and_far_pairs_are_rejected():
     )  # 2 degrees of latitude: 222.39 km on the sphere
 
 
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_pair_does_not_depend_on_stations_computed_with_its_own(monkeypatch, exact):
+    # would catch a pair driven by the record, spectrum or limits of another station, bit by bit
+    stations = [
+        make_station("A", seed=1),
+        make_station("B", latitude=10.1, longest=0.9, seed=2),
+        make_station("ONE", channels=("HNN",), latitude=10.2, seed=3),
+        make_station("D", scale=3.0, latitude=10.3, seed=4),
+        make_station("E", scale=0.3, latitude=10.4, seed=5),
+    ]
+    weak = {"yield_displacement_1": 0.02, "hardening_1": 0.05}
+    kinds = [{}, {"azimuth": np.nan}, {"gap": 0.0}, weak, weak | {"azimuth": np.nan, "gap": 0.01}]
+    kinds += [{"period_1": np.nan, "period_2": np.nan}, {"period_log_std_1": 0.3}, {"gap": 0.3}]
+    rows = [
+        kind | {f"latitude_{i}": 10.0 + 0.1 * place for i in (1, 2)}
+        for kind in kinds
+        for place in range(5)
+    ]
+    settings = Screening(exact=exact)
+    together = per_obspy.risk_table(stations, make_pairs(rows), screening=settings)
+    monkeypatch.setattr("per_obspy.screening.risk.STATIONS_TOGETHER", 1)
+    alone = per_obspy.risk_table(stations, make_pairs(rows), screening=settings)
+    assert together["station"].nunique() == 5
+    pd.testing.assert_frame_equal(together, alone, check_exact=True)
+
+
 def test_a_station_without_coordinates_serves_no_pair():
     table = per_obspy.risk_table([make_station(latitude=np.nan)], make_pairs([{}]))
     assert len(table) == 0

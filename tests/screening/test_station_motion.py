@@ -11,17 +11,22 @@ from per_obspy.screening.station_motion import nearest_azimuth, station_motion
 def test_components_are_in_their_order(station, record):
     # would catch: north and east exchanged, which no symmetric quantity shows
     north, east = station["acceleration"].to_numpy()
-    assert_array_equal(record.north, north)
-    assert_array_equal(record.east, east)
-    assert record.dt == 0.01
-    assert record.usable_periods == (0.05, 9.0)
+    assert_array_equal(record.records[0].north, north)
+    assert_array_equal(record.records[0].east, east)
+    assert record.records[0].dt == 0.01
+    assert record.records[0].usable_periods == (0.05, 9.0)
     assert record.horizontals == 2
     assert np.isnan(record.sensor_azimuth)
 
 
 def test_arrays_are_contiguous_doubles(record):
     # functions of NumPy may differ in the last bit between strides
-    for array in (record.north, record.east, record.per.radii, record.sd.radii):
+    for array in (
+        record.records[0].north,
+        record.records[0].east,
+        record.per.radii,
+        record.sd.radii,
+    ):
         assert array.dtype == np.float64
         assert array.flags["C_CONTIGUOUS"]
 
@@ -42,8 +47,8 @@ def test_a_single_horizontal_counts_as_north_and_has_one_azimuth():
     record = station_motion(station)
     assert record.horizontals == 1
     assert record.sensor_azimuth == 90.0
-    assert_array_equal(record.north, station["acceleration"][0])
-    assert not record.east.any()
+    assert_array_equal(record.records[0].north, station["acceleration"][0])
+    assert not record.records[0].east.any()
     assert record.azimuths.size == len(record.per.radii) == len(record.sd.radii) == 1
     assert_allclose(np.exp(record.per.radii[0]), station["per"][0], rtol=1e-12)
 

@@ -168,11 +168,11 @@ def test_of_several_ductilities_the_largest_is_taken(lakebed, table):
 def test_radii_of_equivalent_buildings_are_those_of_the_record(record, table):
     found = linearized_columns(record, weak(table, 1.1, 1.05))
     for index, azimuth in enumerate(np.radians(table["azimuth_used"])):
-        along = record.north * np.cos(azimuth) + record.east * np.sin(azimuth)
+        along = record.records[0].north * np.cos(azimuth) + record.records[0].east * np.sin(azimuth)
         for i in (1, 2):
             period = found[f"equivalent_period_{i}"][index]
             damping = found[f"equivalent_damping_{i}"][index]
-            direct = per_obspy.per_spectrum(along, record.dt, [period], damping)[0]
+            direct = per_obspy.per_spectrum(along, record.records[0].dt, [period], damping)[0]
             # the spectrum is stored at periods that are 9 % apart
             assert found[f"equivalent_per_{i}"][index] == pytest.approx(direct, rel=0.1)
 

@@ -23,6 +23,7 @@ from per_obspy.screening.site_motion import (
     prepared_field,
 )
 from per_obspy.screening.station_amplitudes import AmplitudeField, amplitude_field
+from per_obspy.screening.station_motion import StationMotion, station_motion
 from per_obspy.spectra.storage import read_spectra
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
@@ -140,7 +141,12 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
     classes = np.array([file.site_class for file in files.stations], dtype=object)
     # Stations and the map stay in memory from one chunk to the next
     stations = Stations(
-        names, longitude, latitude, classes, lambda index: _flagged_station(files.stations[index])
+        names,
+        longitude,
+        latitude,
+        classes,
+        read=lambda index: _flagged_station(files.stations[index]),
+        motion=lambda index: _motion_once(files.stations[index].shard, files.stations[index].hash),
     )
     shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
     return RegionalMotion(stations, files.field, shakemap, files.amplitudes)
@@ -161,6 +167,12 @@ def read_station_once(shard: Path, digest: str) -> xr.Dataset:
     if bytes_hash(content) != digest:
         raise MachineFault(f"{shard}: changed while the run read it")
     return read_spectra(shard, content)
+
+
+@lru_cache(STATIONS_KEPT)
+def _motion_once(shard: Path, digest: str) -> StationMotion:
+    """Return the decoded motion of a station file."""
+    return station_motion(read_station_once(shard, digest))
 
 
 def _flagged_station(file: StationFile) -> xr.Dataset:
