@@ -326,27 +326,32 @@ def _filled(
     until, after = strongest
     motion = ground, *_shapes(stride), dt, after
     # what an acceleration of 1 moves a pair at most, in distance and speed
-    frequency, damping, _, yields, _, reach = structures[:12].reshape(2, 6, -1).swapaxes(0, 1)
-    together = np.stack([reach.sum(axis=0), (frequency * reach).sum(axis=0)])
-    memory = -math.log(FORGOTTEN_BEFORE) / (
-        ROUND * dt * np.maximum(frequency * damping, SMALLEST).min(axis=0)
-    )
-
-    def raised(some: NDArray[np.bool_], floor: FloatArray, largest: FloatArray) -> FloatArray:
-        # acceleration below which nothing yields or counts; what came before must be forgotten
-        counts = np.minimum((floor / together).min(axis=0), (yields / reach).min(axis=0))
-        starts = np.maximum(np.searchsorted(until, counts, "right") - np.ceil(memory), 0.0)
-        pairs, own = np.compress(some, structures, axis=1), np.compress(some, largest, axis=1)
-        fill_approach(*motion, pairs, np.compress(some, floor, axis=1), starts[some], own)
-        return own
-
-    # pairs that do not reach what is expected run again, from what they have reached
+    reach = structures[[5, 11]]
+    together = np.stack([reach.sum(axis=0), (structures[[0, 6]] * reach).sum(axis=0)])
     expected = EXPECTED_APPROACH * until[-1] * together
-    largest = raised(np.ones(together.shape[1], bool), expected, np.zeros_like(together))
+    largest = np.zeros_like(together)
+    fill_approach(
+        *motion, structures, expected, _starts(structures, expected / together, until, dt), largest
+    )
+    # pairs that do not reach what is expected run again, from what they have reached
     short = (largest < expected).any(axis=0)
     if short.any():
-        largest[:, short] = raised(short, largest, largest)
+        pairs, floor = np.compress(short, structures, axis=1), np.compress(short, largest, axis=1)
+        counts, own = floor / np.compress(short, together, axis=1), floor.copy()
+        fill_approach(*motion, pairs, floor, _starts(pairs, counts, until, dt), own)
+        largest[:, short] = own
     return largest
+
+
+def _starts(structures: FloatArray, counts: FloatArray, until: FloatArray, dt: float) -> FloatArray:
+    """Return the rounds before which pairs rest, for accelerations from which maxima count."""
+    # nor may it yield
+    counts = np.minimum(counts.min(axis=0), (structures[[3, 9]] / structures[[5, 11]]).min(axis=0))
+    # what came before must be forgotten
+    rate = np.maximum((structures[[0, 6]] * structures[[1, 7]]).min(axis=0), SMALLEST)
+    memory = np.ceil(-math.log(FORGOTTEN_BEFORE) / (ROUND * dt * rate))
+    starts: FloatArray = np.maximum(np.searchsorted(until, counts, "right") - memory, 0.0)
+    return starts
 
 
 def _strongest(ground: NDArray[np.float32]) -> FloatArray:

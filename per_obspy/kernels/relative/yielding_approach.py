@@ -124,12 +124,14 @@ def _trends(ground, weights):
     trends = np.empty(((ground.shape[1] - 1) // stride, 6), np.float32)
     for number in range(trends.shape[0]):
         for component in range(2):
+            # sums over both ends and all samples between them
             constant = line = parabola = 0.0
             for k in range(stride + 1):
                 sample = ground[component, number * stride + k]
                 constant += weights[0, k] * sample
                 line += weights[1, k] * sample
                 parabola += weights[2, k] * sample
+            # north, then east
             trends[number, 3 * component] = constant
             trends[number, 3 * component + 1] = line
             trends[number, 3 * component + 2] = parabola
@@ -139,10 +141,13 @@ def _trends(ground, weights):
 @lean
 def _pack(t, lane, pairs, number, dt, shapes):
     """Fill the column of a pair at rest."""
+    # at rest
     for row in range(ROWS):
         t[row * LANES + lane] = NOTHING
+    # direction
     t[NORTH + lane], t[EAST + lane] = pairs[12, number], pairs[13, number]
     for body in range(2):
+        # facts of the structure
         k, row = body * SECOND + lane, 6 * body
         omega, damping, share = pairs[row, number], pairs[row + 1, number], pairs[row + 2, number]
         limit, hardening = pairs[row + 3, number], pairs[row + 4, number]
@@ -150,16 +155,19 @@ def _pack(t, lane, pairs, number, dt, shapes):
         a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
         # acceleration of a plastic displacement of 1
         drive = -(1.0 - hardening) * omega * omega
+        # the spring
         t[OMEGA + k], t[LIMIT + k], t[REACH + k] = omega, limit, pairs[row + 5, number]
         t[RESTING + k], t[GROWTH + k] = 1.0 - hardening, 1.0 / (1.0 - drive * b12)
-        # steps
+        # steps from what is there
         t[UU + k], t[UZ + k], t[UP + k] = a11 - 1.0, a12, drive * (b11 + b12)
         t[ZU + k], t[ZZ + k], t[ZP + k] = a21, a22 - 1.0, drive * (b21 + b22)
+        # by the ground, and by what yielding changes
         t[U0 + k], t[U1 + k], t[UD + k] = share * b11, share * b12, drive * b12
         t[Z0 + k], t[Z1 + k], t[ZD + k] = share * b21, share * b22, drive * b22
-        # strides: what a displacement, a velocity and each shape make of a structure
+        # strides: what a displacement and a velocity make of a structure
         t[WW + k], t[YW + k] = _after_stride(coefficients, 1.0, 0.0, shapes, 0, 0.0)
         t[WY + k], t[YY + k] = _after_stride(coefficients, 0.0, 1.0, shapes, 0, 0.0)
+        # from rest by each shape
         t[W0 + k], t[Y0 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 0, share)
         t[W1 + k], t[Y1 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 1, share)
         t[W2 + k], t[Y2 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 2, share)
@@ -169,6 +177,7 @@ def _pack(t, lane, pairs, number, dt, shapes):
 def _after_stride(coefficients, u, z, shapes, number, share):
     """Return the state of a structure after a stride under a share of one of the shapes."""
     a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
+    # step by step
     for k in range(shapes.shape[1] - 1):
         start, end = share * shapes[number, k], share * shapes[number, k + 1]
         u, z = (
