@@ -38,13 +38,11 @@ def aligned_line(table, rows, columns):
 
 
 @kernel
-def aligned_single_line(table, rows, columns):
-    """Return `aligned_line` in single precision: twice as many numbers per vector."""
-    line = aligned(1, rows * columns // 2)[0].view(np.float32)
-    for row in range(rows):
-        for column in range(columns):
-            line[row * columns + column] = table[row, column]
-    return line
+def aligned_single(numbers):
+    """Return an uninitialised line of float32 that begins at a cache line."""
+    memory = np.empty(numbers + 2 * LINE_NUMBERS, np.float32)
+    start = -(memory.ctypes.data // (NUMBER_BYTES // 2)) % (2 * LINE_NUMBERS)
+    return memory[start : start + numbers]
 
 
 @kernel

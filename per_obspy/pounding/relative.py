@@ -37,6 +37,13 @@ EXPECTED_OPENING = 0.1
 #: % at most; longest free vibration after the record, s.
 LARGEST_ANGLE, FREE_VIBRATION = 0.35, 60.0
 
+#: Part of what the largest acceleration may do that pairs that yield are expected to reach: the
+#: bound is wide; largest remainder of their motion before a start, over the bound of what counts.
+EXPECTED_APPROACH, FORGOTTEN_BEFORE = 0.001, 1e-3
+
+#: Dampings and sizes below this are zero, of which there is no ratio.
+SMALLEST = 1e-30
+
 #: Numbers of steps of the strides of pairs that yield, two of which divide a round; largest angle
 #: of a stride, rad, whose half the kernel allows for; longest one, s, so that motion of less than
 #: 12 Hz is seen.
@@ -299,26 +306,88 @@ def yielding_approach(
     # each pair with its own steps
     parts, strides = _steps(pairs.frequency.max(axis=0), step)
     for number in np.unique(parts).tolist():
-        motion = _in_steps(record, step, number)
+        ground = _in_steps(record, step, number)
+        strongest = _strongest(ground)
         for stride in np.unique(strides[parts == number]).tolist():
             alike = (parts == number) & (strides == stride)
             arguments = step / number, stride, np.compress(alike, structures, axis=1)
-            largest[:, alike] = _filled(motion, *arguments)
+            largest[:, alike] = _filled(ground, strongest, *arguments)
     return Approach(*largest.reshape(2, *pairs.shape))
 
 
-def _filled(motion: FloatArray, dt: float, stride: int, structures: FloatArray) -> FloatArray:
+def _filled(
+    ground: NDArray[np.float32],
+    strongest: FloatArray,
+    dt: float,
+    stride: int,
+    structures: FloatArray,
+) -> FloatArray:
     """Return what the kernel fills, (2, n_pairs)."""
-    largest = np.empty_like(structures[:2])
-    fill_approach(*motion, dt, stride, structures, largest)
+    until, after = strongest
+    motion = ground, *_shapes(stride), dt, after
+    # what an acceleration of 1 moves a pair at most, in distance and speed
+    reach = structures[[5, 11]]
+    together = np.stack([reach.sum(axis=0), (structures[[0, 6]] * reach).sum(axis=0)])
+    expected = EXPECTED_APPROACH * until[-1] * together
+    largest = np.zeros_like(together)
+    fill_approach(
+        *motion, structures, expected, _starts(structures, expected / together, until, dt), largest
+    )
+    # pairs that do not reach what is expected run again, from what they have reached
+    short = (largest < expected).any(axis=0)
+    if short.any():
+        pairs, floor = np.compress(short, structures, axis=1), np.compress(short, largest, axis=1)
+        counts, own = floor / np.compress(short, together, axis=1), floor.copy()
+        fill_approach(*motion, pairs, floor, _starts(pairs, counts, until, dt), own)
+        largest[:, short] = own
     return largest
 
 
+def _starts(structures: FloatArray, counts: FloatArray, until: FloatArray, dt: float) -> FloatArray:
+    """Return the rounds before which pairs rest, for accelerations from which maxima count."""
+    # nor may it yield
+    counts = np.minimum(counts.min(axis=0), (structures[[3, 9]] / structures[[5, 11]]).min(axis=0))
+    # what came before must be forgotten
+    rate = np.maximum((structures[[0, 6]] * structures[[1, 7]]).min(axis=0), SMALLEST)
+    memory = np.ceil(-math.log(FORGOTTEN_BEFORE) / (ROUND * dt * rate))
+    starts: FloatArray = np.maximum(np.searchsorted(until, counts, "right") - memory, 0.0)
+    return starts
+
+
+def _strongest(ground: NDArray[np.float32]) -> FloatArray:
+    """Return the largest acceleration until the end of each round, and after its start."""
+    square = ground[0] ** 2 + ground[1] ** 2
+    rounds = np.maximum(square[:-1].reshape(-1, ROUND).max(axis=1), square[ROUND::ROUND])
+    # single precision may be off by some units of its last digit
+    rounds = 1.000001 * np.sqrt(rounds.astype(float))
+    after = np.maximum.accumulate(rounds[::-1])[::-1]
+    return np.stack([np.maximum.accumulate(rounds), after])
+
+
+def _shapes(stride: int) -> tuple[FloatArray, FloatArray]:
+    """
+    Return accelerations in a stride, and by which sums over its samples it has them, (3, samples).
+
+    They are a constant, a line and a parabola, which are orthogonal by the trapezoidal rule.
+    """
+    line, weight = np.arange(stride + 1) - 0.5 * stride, np.ones(stride + 1)
+    weight[[0, -1]] = 0.5
+    parabola = line**2 - np.sum(weight * line**2) / stride
+    shapes = np.stack([np.ones(stride + 1), line, parabola])
+    # a stride of one step has no parabola
+    sizes = np.maximum(np.sum(weight * shapes**2, axis=1, keepdims=True), SMALLEST)
+    return shapes, weight * shapes / sizes
+
+
 def _structures(pairs: Pairs) -> FloatArray:
-    """Return pairs that may yield in the rows of the kernel, (12, n_pairs)."""
-    angle, fields = np.radians(pairs.azimuth), (pairs.frequency, pairs.damping, pairs.participation)
-    numbers = np.stack([*fields, pairs.yield_displacement, pairs.hardening], axis=1)
-    return np.concatenate([numbers.reshape(10, -1), [np.cos(angle), np.sin(angle)]])
+    """Return pairs that may yield in the rows of the kernel, (14, n_pairs)."""
+    angle, damping = np.radians(pairs.azimuth), np.clip(pairs.damping, SMALLEST, 0.999)
+    # ratio of two peaks of free vibration in succession, less 1
+    fading = np.expm1(-math.pi * damping / np.sqrt(1.0 - damping**2))
+    reach = pairs.participation * -2.0 / fading / pairs.frequency**2
+    fields = pairs.frequency, pairs.damping, pairs.participation, pairs.yield_displacement
+    numbers = np.stack([*fields, pairs.hardening, reach], axis=1)
+    return np.concatenate([numbers.reshape(12, -1), [np.cos(angle), np.sin(angle)]])
 
 
 def _steps(frequency: FloatArray, dt: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -329,12 +398,12 @@ def _steps(frequency: FloatArray, dt: float) -> tuple[NDArray[np.intp], NDArray[
     return parts, STRIDES[np.searchsorted(STRIDES[1:], longest, "right")]
 
 
-def _in_steps(record: FloatArray, dt: float, parts: int) -> FloatArray:
+def _in_steps(record: FloatArray, dt: float, parts: int) -> NDArray[np.float32]:
     """Return a record in equal parts of its sampling intervals, and zeros after it."""
     last = record.shape[1] - 1
     # whole rounds of the kernel
     rounds = -(-(last + int(FREE_VIBRATION / dt)) * parts // ROUND)
-    motion = np.zeros((2, rounds * ROUND + 1))
+    motion = np.zeros((2, rounds * ROUND + 1), np.float32)
     for part in range(parts):
         share = part / parts
         motion[:, part : last * parts : parts] = record[:, :-1] + share * np.diff(record)

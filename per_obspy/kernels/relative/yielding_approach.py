@@ -9,17 +9,16 @@ not follow. Where yielding begins or ends between two samples p bends; the error
 in the step.
 
 Most of the time nothing yields and nothing counts. A round of steps is first taken in strides, in
-which p stays, about the displacement at rest: three moments of the acceleration move a structure
-over a stride of any number of steps. Only pairs that come near a yield displacement or a maximum at
-the ends of the strides take the round again, step by step.
+which p stays, about the displacement at rest: of the acceleration a constant, a line and a parabola
+move a structure over a stride of any number of steps. Only pairs that come near a yield
+displacement or a maximum at the ends of the strides take the round again, step by step.
 
 The begin and the end of a record are too weak to count. From rest an acceleration of at most a
 moves a structure by ``a q X / omega²`` at most, X being the integral of the size of the impulse
 response, ``2 / (1 - rho)`` at most, where rho is the ratio of two peaks of free vibration in
-succession. A pair rests until it may yield, or exceed a small part of what the largest acceleration
-may do, less the time in which it forgets; one that does not reach this part runs again, from what
-it has reached. Beside the motion that is there the bound shows the round from which nothing can
-exceed the maxima so far.
+succession. A pair rests until it may yield, or exceed its floor, less the time in which it forgets:
+round and floor are the caller's. Beside the motion that is there the bound shows the round from
+which nothing can exceed the maxima so far.
 
 Single precision doubles the lanes of a vector. What a pair shares a block with changes no bit.
 """
@@ -28,7 +27,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._aligned import aligned_single_line
+from per_obspy.kernels._aligned import aligned_single
 from per_obspy.kernels._jit import inlined, kernel, lean, vectorised
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 
@@ -41,17 +40,10 @@ ROUND, CHECKED_ROUNDS = 48, 4
 #: between them reaches all of it. A vibration exceeds them by 1 / cos(theta / 2), theta being the
 #: angle of a stride.
 NEAR = np.float32(0.86)
-#: Part of what the largest acceleration may do that a pair is expected to reach: the bound is wide.
-EXPECTED = 0.001
-#: Largest remainder of the motion before a start, over the bound of what counts.
-FORGOTTEN = 1e-3
 #: Bounds of what may still come grow by this, beside which rounding does not matter.
 ROUNDING = 1.00001
-#: Displacement of an undamped structure by a small acceleration: 0 without any.
-UNBOUNDED = 1e30
-
 #: Numbers of single precision: zero, one, and one below all displacements.
-NOTHING, ONE, LOWEST = np.float32(0.0), np.float32(1.0), np.float32(-UNBOUNDED)
+NOTHING, ONE, LOWEST = np.float32(0.0), np.float32(1.0), np.float32(-1e30)
 #: States below this are set to zero: denormal numbers are slow.
 SMALLEST_STATE = np.float32(1e-30)
 
@@ -60,7 +52,7 @@ SMALLEST_STATE = np.float32(1e-30)
 #: its end; what a change of p adds to both; yield displacement; growth of p over what is beyond it;
 #: omega; displacement at rest and largest one, by a plastic displacement and an acceleration of 1.
 #: Of strides: p before the round; what a stride makes of displacement from rest and velocity over
-#: omega, and of three moments; both now; largest and least displacement from rest in the round.
+#: omega, and of three shapes; both now; largest and least displacement from rest in the round.
 #: After both structures: the direction; largest relative displacement and velocity before the
 #: round, in steps and in strides; what they need not reach; whether the round counts step by step;
 #: first round.
@@ -80,235 +72,123 @@ DISTANCE_BY_STRIDE, SPEED_BY_STRIDE, DISTANCE_FLOOR, SPEED_FLOOR, BY_STEP, START
 
 
 @kernel
-def yielding_approach(north, east, dt, stride, pairs, largest):
+def yielding_approach(ground, shapes, weights, dt, after, pairs, floor, starts, largest):
     """
-    Fill the largest relative displacements and velocities of pairs that may yield, at the samples.
+    Raise the largest relative displacements and velocities of pairs that may yield, at the samples.
 
     Parameters
     ----------
-    north, east : (n_rounds * ROUND + 1,) ndarray
-        Components of the ground acceleration, m/s², and zeros after the record, in which free
+    ground : (2, n_rounds * ROUND + 1) ndarray of float32
+        North and east of the ground acceleration, m/s², and zeros after the record, in which free
         vibration is followed as far as it counts.
+    shapes, weights : (3, stride + 1) ndarray
+        Accelerations at the samples of a stride, and how much each sample has of them. A round has
+        an even number of strides.
     dt : float
         Time between samples, s.
-    stride : int
-        Steps of a stride, of which a round has an even number.
-    pairs : (12, n) ndarray
+    after : (n_rounds,) ndarray
+        Largest acceleration in any direction from the start of each round on, m/s².
+    pairs : (14, n) ndarray
         Rows: circular frequency (rad/s), damping (fraction of critical), participation
-        (dimensionless), yield displacement at contact level (m) and hardening of structure 1, then
-        of 2; cosine and sine of the azimuth from 1 to 2.
+        (dimensionless), yield displacement at contact level (m), hardening, and the largest
+        displacement by an acceleration of at most 1 m/s² (m) of structure 1, then of 2; cosine and
+        sine of the azimuth from 1 to 2.
+    floor : (2, n) ndarray
+        Maxima below which the motion need not be followed.
+    starts : (n,) ndarray
+        Number of the round before which a pair rests.
     largest : (2, n) ndarray
-        Receives the maxima of ``q1 u1 - q2 u2``, m, and of ``q1 v1 - q2 v2``, m/s.
+        Maxima of ``q1 u1 - q2 u2``, m, and of ``q1 v1 - q2 v2``, m/s, that are raised.
     """
-    until, after = _strongest(north, east)
-    # ground motion in strides and in steps
-    shapes = _shapes(stride)
-    moments = _moments(north, east, shapes)
-    ground = _single(north, east)
-    table = np.zeros((ROWS, LANES))
-    largest[:] = 0.0
-    pending = np.empty(pairs.shape[1], np.int64)
-    for index in range(pending.size):
-        pending[index] = index
-    # the second time begins with what the first has reached
-    for again in range(2):
-        short, count = np.empty(pending.size, np.int64), 0
-        for first in range(0, pending.size, LANES):
-            # the last block has copies of its last pair
-            chosen = pending[first : first + LANES]
-            for lane in range(LANES):
-                number = chosen[min(lane, chosen.size - 1)]
-                _pack(pairs, number, dt, shapes, table, lane)
-                _start(pairs, number, dt, until, again, largest, table, lane)
-            local = aligned_single_line(table, ROWS, LANES)
-            _run(local, ground, moments, stride, after)
-            # maxima of the block without the copies
-            for lane in range(chosen.size):
-                largest[0, chosen[lane]] = local[DISTANCE + lane]
-                largest[1, chosen[lane]] = local[SPEED + lane]
-                if not again and _is_short(local, lane):
-                    short[count] = chosen[lane]
-                    count += 1
-        pending = short[:count]
+    trends, stride = _trends(ground, weights), shapes.shape[1] - 1
+    t, count = aligned_single(ROWS * LANES), pairs.shape[1]
+    for first in range(0, count, LANES):
+        # the last block has copies of its last pair
+        for lane in range(LANES):
+            number = first + lane if first + lane < count else count - 1
+            _pack(t, lane, pairs, number, dt, shapes)
+            t[DISTANCE + lane], t[SPEED + lane] = largest[0, number], largest[1, number]
+            t[DISTANCE_FLOOR + lane], t[SPEED_FLOOR + lane] = floor[0, number], floor[1, number]
+            t[START + lane] = starts[number]
+        _run(t, ground, trends, stride, after)
+        # the copies have the maxima of their pair
+        for lane in range(LANES):
+            number = first + lane if first + lane < count else count - 1
+            largest[0, number], largest[1, number] = t[DISTANCE + lane], t[SPEED + lane]
 
 
 @kernel
-def _strongest(north, east):
-    """Return the largest acceleration up to the end of each round, and from its start on."""
-    rounds = (north.size - 1) // ROUND
-    until, after = np.zeros(rounds), np.zeros(rounds)
-    # of each round, and of those before it
-    for number in range(rounds):
-        square = 0.0
-        for i in range(number * ROUND, (number + 1) * ROUND + 1):
-            square = max(square, north[i] * north[i] + east[i] * east[i])
-        after[number] = math.sqrt(square)
-        until[number] = max(after[number], until[max(number - 1, 0)])
-    # and of those after it
-    for number in range(rounds - 2, -1, -1):
-        after[number] = max(after[number], after[number + 1])
-    return until, after
-
-
-@kernel
-def _shapes(stride):
-    """
-    Return three shapes of an acceleration over a stride, (3, samples), and their weights in sums.
-
-    They are polynomials that are orthogonal by the trapezoidal rule; a stride of one step has two.
-    """
-    # a constant, and half weights at both ends
-    shapes = np.empty((4, stride + 1))
-    # a line, and a parabola without the constant
-    total = 0.0
-    for k in range(stride + 1):
-        shapes[0, k], shapes[3, k] = 1.0, 1.0 if 0 < k < stride else 0.5
-        shapes[1, k] = k - 0.5 * stride
-        total += shapes[3, k] * shapes[1, k] * shapes[1, k]
-    for k in range(stride + 1):
-        shapes[2, k] = shapes[1, k] * shapes[1, k] - total / stride
-    return shapes
-
-
-@kernel
-def _single(north, east):
-    """Return both components in single precision."""
-    single = np.empty((2, north.size), np.float32)
-    for i in range(north.size):
-        single[0, i], single[1, i] = north[i], east[i]
-    return single
-
-
-@kernel
-def _moments(north, east, shapes):
-    """Return the sums over each stride of the samples of north and east times shapes, (n, 6)."""
-    stride = shapes.shape[1] - 1
-    moments = np.empty(((north.size - 1) // stride, 6), np.float32)
-    for number in range(moments.shape[0]):
-        n0 = n1 = n2 = e0 = e1 = e2 = 0.0
-        for k in range(stride + 1):
-            # a sample counts in three sums of either component
-            i = number * stride + k
-            along, across = shapes[3, k] * north[i], shapes[3, k] * east[i]
-            n0, n1, n2 = n0 + along, n1 + shapes[1, k] * along, n2 + shapes[2, k] * along
-            e0, e1, e2 = e0 + across, e1 + shapes[1, k] * across, e2 + shapes[2, k] * across
-        # north, then east
-        moments[number, 0], moments[number, 1], moments[number, 2] = n0, n1, n2
-        moments[number, 3], moments[number, 4], moments[number, 5] = e0, e1, e2
-    return moments
+def _trends(ground, weights):
+    """Return how much of each shape the strides of north, then of east have, (n, 6)."""
+    stride = weights.shape[1] - 1
+    trends = np.empty(((ground.shape[1] - 1) // stride, 6), np.float32)
+    for number in range(trends.shape[0]):
+        for component in range(2):
+            # sums over both ends and all samples between them
+            constant = line = parabola = 0.0
+            for k in range(stride + 1):
+                sample = ground[component, number * stride + k]
+                constant += weights[0, k] * sample
+                line += weights[1, k] * sample
+                parabola += weights[2, k] * sample
+            # north, then east
+            trends[number, 3 * component] = constant
+            trends[number, 3 * component + 1] = line
+            trends[number, 3 * component + 2] = parabola
+    return trends
 
 
 @lean
-def _pack(pairs, number, dt, shapes, table, lane):
+def _pack(t, lane, pairs, number, dt, shapes):
     """Fill the column of a pair at rest."""
     # at rest
     for row in range(ROWS):
-        table[row, lane] = 0.0
-    stride = shapes.shape[1] - 1
+        t[row * LANES + lane] = NOTHING
+    # direction
+    t[NORTH + lane], t[EAST + lane] = pairs[12, number], pairs[13, number]
     for body in range(2):
-        row, column = STRUCTURE * body, 5 * body
-        omega, damping, share = (
-            pairs[column, number],
-            pairs[column + 1, number],
-            pairs[column + 2, number],
-        )
+        # facts of the structure
+        k, row = body * SECOND + lane, 6 * body
+        omega, damping, share = pairs[row, number], pairs[row + 1, number], pairs[row + 2, number]
+        limit, hardening = pairs[row + 3, number], pairs[row + 4, number]
         coefficients = step_coefficients(omega, damping, dt)
         a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
         # acceleration of a plastic displacement of 1
-        drive = -(1.0 - pairs[column + 4, number]) * omega * omega
-        # displacement after a step
-        table[row + 3, lane], table[row + 4, lane] = a11 - 1.0, a12
-        table[row + 5, lane] = drive * (b11 + b12)
-        table[row + 6, lane], table[row + 7, lane] = share * b11, share * b12
-        # velocity over omega after it
-        table[row + 8, lane], table[row + 9, lane] = a21, a22 - 1.0
-        table[row + 10, lane] = drive * (b21 + b22)
-        table[row + 11, lane], table[row + 12, lane] = share * b21, share * b22
-        # what yielding changes
-        table[row + 13, lane], table[row + 14, lane] = drive * b12, drive * b22
-        table[row + 15, lane] = pairs[column + 3, number]
-        table[row + 16, lane] = 1.0 / (1.0 - drive * b12)
-        table[row + 17, lane], table[row + 18, lane] = omega, 1.0 - pairs[column + 4, number]
-        # what an acceleration moves it at most
-        table[row + 19, lane] = share * _longest_sum(damping) / (omega * omega)
-        # strides
-        for k in range(2):
-            u, z = 1.0 - k, float(k)
-            for _ in range(stride):
-                u, z = a11 * u + a12 * z, a21 * u + a22 * z
-            table[row + 21 + k, lane], table[row + 26 + k, lane] = u, z
-        _fill_shares(coefficients, share, shapes, table, row, lane)
-    # direction
-    table[DIRECTION, lane], table[DIRECTION + 1, lane] = pairs[10, number], pairs[11, number]
-
-
-@inlined
-def _longest_sum(damping):
-    """Return a bound of the integral of the size of the impulse response."""
-    limited = min(damping, 0.999)
-    ratio = math.exp(-math.pi * limited / math.sqrt(1.0 - limited * limited))
-    return 2.0 / (1.0 - ratio) if damping > 0.0 else UNBOUNDED
+        drive = -(1.0 - hardening) * omega * omega
+        # the spring
+        t[OMEGA + k], t[LIMIT + k], t[REACH + k] = omega, limit, pairs[row + 5, number]
+        t[RESTING + k], t[GROWTH + k] = 1.0 - hardening, 1.0 / (1.0 - drive * b12)
+        # steps from what is there
+        t[UU + k], t[UZ + k], t[UP + k] = a11 - 1.0, a12, drive * (b11 + b12)
+        t[ZU + k], t[ZZ + k], t[ZP + k] = a21, a22 - 1.0, drive * (b21 + b22)
+        # by the ground, and by what yielding changes
+        t[U0 + k], t[U1 + k], t[UD + k] = share * b11, share * b12, drive * b12
+        t[Z0 + k], t[Z1 + k], t[ZD + k] = share * b21, share * b22, drive * b22
+        # strides: what a displacement and a velocity make of a structure
+        t[WW + k], t[YW + k] = _after_stride(coefficients, 1.0, 0.0, shapes, 0, 0.0)
+        t[WY + k], t[YY + k] = _after_stride(coefficients, 0.0, 1.0, shapes, 0, 0.0)
+        # from rest by each shape
+        t[W0 + k], t[Y0 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 0, share)
+        t[W1 + k], t[Y1 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 1, share)
+        t[W2 + k], t[Y2 + k] = _after_stride(coefficients, 0.0, 0.0, shapes, 2, share)
 
 
 @lean
-def _fill_shares(coefficients, share, shapes, table, row, lane):
-    """Fill what the moments of a stride add to a structure at its end."""
+def _after_stride(coefficients, u, z, shapes, number, share):
+    """Return the state of a structure after a stride under a share of one of the shapes."""
     a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
-    stride = shapes.shape[1] - 1
-    for j in range(3):
-        # its motion from rest under the shape, and the moment of the shape itself
-        u = z = 0.0
-        own = shapes[3, 0] * shapes[j, 0] * shapes[j, 0]
-        for k in range(stride):
-            start, end = shapes[j, k], shapes[j, k + 1]
-            u, z = (
-                a11 * u + a12 * z + (b11 * start + b12 * end),
-                a21 * u + a22 * z + (b21 * start + b22 * end),
-            )
-            own += shapes[3, k + 1] * end * end
-        # two samples have no third shape
-        scale = share / own if j < 2 or stride > 1 else 0.0
-        table[row + 23 + j, lane], table[row + 28 + j, lane] = scale * u, scale * z
-
-
-@lean
-def _start(pairs, number, dt, until, again, largest, table, lane):
-    """Fill what the maxima need not reach, and the round before which the pair rests."""
-    # displacement and velocity by an acceleration of 1
-    reach, other = table[19, lane], table[STRUCTURE + 19, lane]
-    together, speed = reach + other, pairs[0, number] * reach + pairs[5, number] * other
-    # what was reached, or is expected
-    if again:
-        distance, approach = largest[0, number], largest[1, number]
-        table[DIRECTION + 2, lane], table[DIRECTION + 3, lane] = distance, approach
-    else:
-        part = EXPECTED * until[until.size - 1] if together < UNBOUNDED * 1e-10 else 0.0
-        distance, approach = part * together, part * speed
-    table[DIRECTION + 8, lane], table[DIRECTION + 9, lane] = distance, approach
-    # acceleration below which it neither yields nor exceeds them
-    counts = min(distance / together, approach / speed)
-    counts = min(counts, pairs[3, number] / reach, pairs[8, number] / other)
-    first = 0
-    while first < until.size and until[first] <= counts:
-        first += 1
-    # back to where all before is forgotten by then
-    rate = min(pairs[0, number] * pairs[1, number], pairs[5, number] * pairs[6, number])
-    fade, left = math.exp(-rate * ROUND * dt), 1.0
-    while first > 0 and left * until[min(first, until.size) - 1] > FORGOTTEN * counts:
-        first -= 1
-        left *= fade
-    table[DIRECTION + 11, lane] = first
-
-
-@lean
-def _is_short(t, lane):
-    """Return whether a pair does not reach what it was expected to."""
-    far, fast = t[DISTANCE + lane], t[SPEED + lane]
-    return far < t[DISTANCE_FLOOR + lane] or fast < t[SPEED_FLOOR + lane]
+    # step by step
+    for k in range(shapes.shape[1] - 1):
+        start, end = share * shapes[number, k], share * shapes[number, k + 1]
+        u, z = (
+            a11 * u + a12 * z + (b11 * start + b12 * end),
+            a21 * u + a22 * z + (b21 * start + b22 * end),
+        )
+    return u, z
 
 
 @kernel
-def _run(t, ground, moments, stride, after):
+def _run(t, ground, trends, stride, after):
     """Advance a block through the rounds that count, until nothing can raise a maximum."""
     # the first round of any pair
     begin = t[START]
@@ -322,7 +202,7 @@ def _run(t, ground, moments, stride, after):
         # in strides, until a pair counts
         _begin_round(t)
         for i in range(number * strides, (number + 1) * strides, 2):
-            m, o = moments[i], moments[i + 1]
+            m, o = trends[i], trends[i + 1]
             _stride(t, m[0], m[1], m[2], m[3], m[4], m[5], o[0], o[1], o[2], o[3], o[4], o[5])
         this = np.float32(number)
         _mark(t, this)
@@ -361,7 +241,7 @@ def _begin_round(t):
 
 @vectorised
 def _stride(t, n0, n1, n2, e0, e1, e2, n3, n4, n5, e3, e4, e5):
-    """Advance a block by two strides about rest, under three moments each of north and east."""
+    """Advance a block by two strides about rest, under three shapes each of north and east."""
     for lane in range(LANES):
         other = SECOND + lane
         # direction
