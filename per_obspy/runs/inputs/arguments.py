@@ -60,17 +60,7 @@ def requested_run(
     # A configuration, as it is or with changes
     if second is None and (file := _configuration(first)):
         line = "" if file == Path(first) else f"configuration: {file}"
-        if not changed and output is None:
-            return Request(file, line)
-        given = read_toml(file)
-        content = merged(given, changed)
-        # The folder of the command takes the place of a missing one
-        if output is not None:
-            content.setdefault("output", str(output.absolute()))
-        if content == given:
-            return Request(file, line)
-        source = f"{file} and --set" if changed else str(file)
-        return Request(checked(Run, content, source, file.resolve().parent), line)
+        return Request(_configured(file, changed, output), line)
     # Records and pairs
     records, pairs = _roles(first, second, changed)
     pairs = pairs and str(_one_table(pairs))
@@ -81,6 +71,21 @@ def requested_run(
     line = f"{_said('records', records)}; {_said('pairs', pairs)}; results: {results}"
     _require_apart(settings)
     return Request(settings, line)
+
+
+def _configured(file: Path, changed: dict[str, Any], output: Path | None) -> Path | Run:
+    """Return the settings of a file with changes; the file itself where there are none."""
+    if not changed and output is None:
+        return file
+    given = read_toml(file)
+    content = merged(given, changed)
+    # The folder of the command takes the place of a missing one
+    if output is not None:
+        content.setdefault("output", str(output.absolute()))
+    if content == given:
+        return file
+    source = f"{file} and --set" if changed else str(file)
+    return checked(Run, content, source, file.resolve().parent)
 
 
 def run_content(records: str | None, pairs: str | None, output: Path) -> dict[str, Any]:
