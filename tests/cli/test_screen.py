@@ -91,10 +91,10 @@ def test_json_is_for_machines(screened):
     said = json.loads(out)
     assert code == 0
     assert (said["pairs"], said["yes"], said["rejected"]) == (1, 1, 1)
-    # table, meanings, totals, summary and page with the overview; rejections last
+    # table, meanings, totals, summary, overview and page; rejections last
     assert [Path(file).name for file in said["files"]] == [
         *("design.csv", "design.parquet", "design.columns.csv", "totals.csv"),
-        *("summary.txt", "summary.pdf", "report.html", "design.kml", "overview.png"),
+        *("summary.txt", "summary.pdf", "design.kml", "overview.png", "report.html"),
         "rejected.csv",
     ]
 
