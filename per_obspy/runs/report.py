@@ -20,6 +20,7 @@ import xarray as xr
 from per_obspy.config import Design, Ensemble, Run, Totals
 from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.errors import CatalogError
+from per_obspy.files import remove_file
 from per_obspy.report.files import (
     Explained,
     PairTable,
@@ -76,6 +77,8 @@ def explaining(
     if not files:
         yield lambda _: Drawings()
         return
+    # What an earlier table was explained by
+    remove_file(path)
     # What cannot begin is noted where the others are written
     with ExitStack() as stack:
         finished: Callable[[], Drawings] | None = None
