@@ -397,6 +397,8 @@ def report_ensemble(
 
 def _store_histories(runs: ScenarioRuns, table: Path, path: Path, report: Report) -> None:
     """Write the histories of the worst pairs of an ensemble."""
+    # Those of an earlier table are no answer where this fails
+    remove_file(path)
     with report.tried(path), ranked_table([table]) as ranked:
         write_drawings(Drawings(histories=runs.histories(ranked)), path)
 
