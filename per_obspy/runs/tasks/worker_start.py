@@ -8,6 +8,7 @@ command line on Linux forks: a program has one server, which may be that of its 
 libraries of macOS do not survive a fork.
 """
 
+import gc
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,7 +42,8 @@ def loading() -> Iterator[None]:
     """Load libraries in a block; those of a program are left out of later searches for garbage."""
     with no_search():
         yield
-    if are_forks():
+    # Once: what a watcher has from one run to the next is found by later searches
+    if are_forks() and not gc.get_freeze_count():
         keep_all()
 
 

@@ -1,5 +1,6 @@
 """Workers of the command line are forks of one server, which ends with the program."""
 
+import gc
 import signal
 import subprocess
 import sys
@@ -61,3 +62,19 @@ def test_a_program_of_somebody_else_starts_fresh_interpreters():
     with worker_start.forked_workers():
         assert worker_start.worker_context().get_start_method() == "forkserver"
     assert worker_start.worker_context().get_start_method() == "spawn"
+
+
+def test_what_a_watcher_leaves_behind_is_searched_for_garbage():
+    # catches: all objects left out of later searches at every run of a long process
+    gc.unfreeze()
+    try:
+        with worker_start.forked_workers(), worker_start.loading():
+            pass
+        kept = gc.get_freeze_count()
+        left = [[] for _ in range(1000)]
+        with worker_start.forked_workers(), worker_start.loading():
+            pass
+        # none of those came to the kept ones, a few of which may have ended
+        assert 0 < gc.get_freeze_count() < kept + len(left) // 2
+    finally:
+        gc.unfreeze()
