@@ -6,6 +6,7 @@ from contextlib import suppress
 from functools import lru_cache
 from multiprocessing import parent_process
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numba
@@ -44,14 +45,24 @@ OPTIONS: dict[str, Any] = {
 NO_FOLDER = "no locator available"
 
 
+#: Errors of Numba where a file of compiled code is damaged.
+_DAMAGE = (
+    *(EOFError, UnpicklingError, ImportError, AttributeError),
+    *(LookupError, TypeError, ValueError),
+)
+
+
 class SharedCache(FunctionCache):
     """Compiled code of one kernel on disk, which several processes may save at the same time."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load one signature; none that names a module which an earlier version had."""
+        """Load one signature; none of a damaged file, or of a module that is gone."""
         try:
             return super().load_overload(sig, target_context)
-        except ImportError:
+        except _DAMAGE:
+            # It is compiled and saved again
+            with suppress(OSError):
+                self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -65,7 +76,10 @@ class SharedCache(FunctionCache):
     def stored_signatures(self, target_context: Any) -> list[Any]:
         """Return the signatures that are stored for this version and processor."""
         codegen = target_context.codegen()
-        keys = list(self._cache_file._load_index())
+        try:
+            keys = list(self._cache_file._load_index())
+        except _DAMAGE:
+            return []
         return [key[0] for key in keys if key == self._index_key(key[0], codegen)]
 
 

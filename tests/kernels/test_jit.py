@@ -64,6 +64,29 @@ def test_stored_kernels_are_loaded_without_a_call(monkeypatch):
     assert not never.kernel.overloads
 
 
+@pytest.mark.compiled
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_damaged_compiled_code_is_compiled_again(kind, monkeypatch):
+    # would catch a file that was cut, for example by a full disk, which ended every later run
+    def fourfold(value):
+        return 4.0 * value
+
+    kernel = _jit.kernel(fourfold)
+    assert kernel(1.5) == 6.0
+    files = list(Path(kernel.stats.cache_path).glob(f"*fourfold*.{kind}"))
+    assert files
+    for file in files:
+        file.write_bytes(file.read_bytes()[:40])
+    again = _jit.kernel(fourfold)
+    monkeypatch.setattr(_jit, "_kernels", [again.kernel])
+    _jit.load_stored()
+    assert again(1.5) == 6.0
+    # and stored whole
+    third = _jit.kernel(fourfold)
+    assert third(1.5) == 6.0
+    assert list(third.kernel.stats.cache_hits.values()) == [1]
+
+
 def test_sums_keep_their_order():
     # would catch: reassociation, after which a result depends on the length of a vector
     @_jit.kernel
